@@ -1,0 +1,371 @@
+"""highway-env objects to shield arrays and back: the only reader of highway-env's internals."""
+
+from typing import NamedTuple
+
+import numpy as np
+from highway_env.road.lane import CircularLane, SineLane, StraightLane
+from highway_env.vehicle.controller import ControlledVehicle
+from highway_env.vehicle.objects import Landmark
+from numba import njit
+
+from shield.blame import DUTIES, VERDICTS, judge_contact, judge_frame
+from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_STEER, Body, Command, shield_frame
+from shield.geometry import PIECE_FIELDS, extents_within, locate, wrap_angle
+from shield.pair import ROAD_USER
+from shield.params import RSSParams, Rules
+from shield.response import LAT, LON, MEMORY
+
+_JOIN = 0.5  # lane ends closer than this belong together [m]
+_CHAIN = 8  # lanes followed in either direction
+_SAMPLE = 2.0  # spacing of the pieces that stand in for a curve of changing curvature [m]
+
+AXES = {0: "inherited", LON: "longitudinal", LAT: "lateral", LON | LAT: "both"}
+
+
+class Settings(NamedTuple):
+    """What a shield runs with, response times in whole frames."""
+
+    ego: RSSParams
+    other: RSSParams
+    rules: Rules
+    overrides: bool  # False: watch only
+    dt: float  # length of a simulation frame [s]
+
+
+class Frame(NamedTuple):
+    """One recorded frame: everything the shield saw, and the command that was executed."""
+
+    ego: np.ndarray  # `ROAD_USER`, 0-d
+    users: np.ndarray  # `[N]` `ROAD_USER`
+    keys: tuple[int, ...]  # `[N]` identity of each user within the episode
+    command: Command
+    curvature: float  # of the lane at the ego [1/m]
+    poses: np.ndarray  # `[N + 1, 4]` x, y, heading, speed in the world, the ego last
+
+
+# ---------------------------------------------------------------- roads
+
+
+def _pieces_of(lane) -> list[tuple[float, ...]]:
+    """Pieces of constant curvature (see `shield.geometry`) of one lane, arc length still 0."""
+    half_width = lane.width_at(0.0) / 2
+    if isinstance(lane, StraightLane) and not isinstance(lane, SineLane):
+        (x, y), heading = lane.position(0.0, 0.0), lane.heading_at(0.0)
+        return [(x, y, heading, 0.0, lane.length, 0.0, half_width)]
+    if isinstance(lane, CircularLane):
+        (x, y), heading = lane.position(0.0, 0.0), lane.heading_at(0.0)
+        curvature = (1.0 if lane.clockwise else -1.0) / lane.radius
+        return [(x, y, heading, curvature, lane.length, 0.0, half_width)]
+    corners = np.array([lane.position(s, 0.0) for s in np.linspace(0.0, lane.length, int(lane.length // _SAMPLE) + 2)])
+    steps = np.diff(corners, axis=0)
+    return [
+        (x, y, np.arctan2(dy, dx), 0.0, np.hypot(dx, dy), 0.0, half_width)
+        for (x, y), (dx, dy) in zip(corners[:-1], steps, strict=True)
+    ]
+
+
+def _joined(first, second) -> bool:
+    end, start = first.position(first.length, 0.0), second.position(0.0, 0.0)
+    turn = wrap_angle(first.heading_at(first.length) - second.heading_at(0.0))
+    return bool(np.hypot(*(end - start)) < _JOIN and abs(turn) < np.pi / 4)
+
+
+def _neighbour(network, index, forward: bool):
+    """Lane that continues `index` without a jump, or None."""
+    lane = network.get_lane(index)
+    for origin, ends in network.graph.items():
+        for end, lanes in ends.items():
+            if (origin if forward else end) == (index[1] if forward else index[0]):
+                for i, other in enumerate(lanes):
+                    if _joined(lane, other) if forward else _joined(other, lane):
+                        return origin, end, i
+    return None
+
+
+def road_through(network, index) -> np.ndarray:
+    """The road along a lane as `[K, 7]` pieces: the lane itself, what leads to it and what follows.
+
+    Arc length counts from the start of the lane `index`.
+    """
+    chain = [index]
+    for forward in (False, True):
+        for _ in range(_CHAIN):
+            found = _neighbour(network, chain[-1] if forward else chain[0], forward)
+            if found is None or found in chain:
+                break
+            chain = [*chain, found] if forward else [found, *chain]
+    rows, start, offset = [], 0.0, 0.0
+    for lane_index in chain:
+        if lane_index == index:
+            offset = start
+        for piece in _pieces_of(network.get_lane(lane_index)):
+            rows.append((*piece[:5], start, piece[6]))
+            start += piece[4]
+    road = np.array(rows, dtype=float).reshape(-1, PIECE_FIELDS)
+    road[:, 5] -= offset
+    return road
+
+
+def _same_frame(road: np.ndarray, other: np.ndarray) -> bool:
+    """Do two roads differ by a lateral shift at most? Then no gap jumps between them."""
+    straight = not (road[:, 3].any() or other[:, 3].any())
+    return straight and bool(np.ptp(np.concatenate([road[:, 2], other[:, 2]])) < 1e-9)
+
+
+@njit(cache=True)
+def _to_lane_frame(road, poses, before, sizes, wrecks, own_lane, heading_bound, dt, out):
+    """Fill `out` `[N]` `ROAD_USER` from world poses `[N, 4]`; `before` `[N, 2]` is nan at first sight."""
+    curvature = 0.0
+    for i in range(len(poses)):
+        x, y, heading, speed = poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3]
+        s, lateral, lane_heading, curvature = locate(road, x, y)
+        psi = wrap_angle(heading - lane_heading)
+        if np.isnan(before[i, 0]):
+            u = speed * np.sin(psi)
+        else:
+            u = ((y - before[i, 1]) * np.cos(lane_heading) - (x - before[i, 0]) * np.sin(lane_heading)) / dt
+        bound = 1.0 if sizes[i, 2] == 0.0 else heading_bound
+        half_length, half_width = extents_within(sizes[i, 0], sizes[i, 1], psi, bound)
+        out[i].s, out[i].y, out[i].heading, out[i].speed, out[i].u = s, lateral, psi, speed, u
+        out[i].half_length, out[i].half_width = half_length, half_width
+        out[i].wreck, out[i].in_own_lane = wrecks[i], own_lane[i]
+    return curvature  # of the lane at the last pose
+
+
+# ---------------------------------------------------------------- one ego under the shield
+
+
+class StepTally:
+    """What happened in one decision step, frame by frame."""
+
+    def __init__(self) -> None:
+        self.frames = self.overridden = self.limited = 0
+        self.dangerous_pairs = self.broken_duties = 0
+        self.acceleration_change = self.steering_change = 0.0
+        self.margin_lon = self.margin_lat = float("inf")
+        self.partner = -1
+        self.response = 0
+
+
+class ShieldedEgo:
+    """The shield on one controlled vehicle. It takes the place of the vehicle's `act`.
+
+    highway-env calls `act()` without an argument once per frame, when every vehicle chooses its
+    command and none has moved: the state is consistent. The bound method lives in the vehicle's
+    own `__dict__`, so a deep copy or a pickle of the environment carries its own shield along.
+    """
+
+    def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
+        self.vehicle = vehicle
+        self.settings = settings
+        self.body = (vehicle.LENGTH / 2, float(np.arctan(np.tan(ControlledVehicle.MAX_STEERING_ANGLE) / 2)))
+        self.nominal = dict(vehicle.action)
+        self.others: list = []
+        self.keys: list[int] = []
+        self.seen = 0
+        self.memory = np.zeros(0, MEMORY)
+        self.before = np.zeros((0, 2))
+        self.roads: dict = {}
+        self.lane_index = None
+        self.road = np.zeros((0, PIECE_FIELDS))
+        self.contact: dict | None = None
+        self.frames = self.frames_overridden = 0
+        self.cost = 0.0
+        self.min_ttc = float("inf")
+        self.tally = StepTally()
+        self.log: list[Frame] | None = [] if record else None
+        vehicle.act = self.act
+
+    # -- called by highway-env
+
+    def act(self, action=None) -> None:
+        vehicle = self.vehicle
+        type(vehicle).act(vehicle, action)
+        if action is not None:
+            self.nominal = dict(vehicle.action)
+        elif not self.check_contact():
+            self._frame()
+
+    def _frame(self) -> None:
+        vehicle, settings = self.vehicle, self.settings
+        # meta-actions compute a new command on every frame, a continuous one persists
+        nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
+        users, ego, curvature = self._sense()
+        wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(nominal["steering"]))))
+        report = shield_frame(
+            ego,
+            users,
+            self.memory,
+            wish,
+            Body(*self.body, curvature),
+            settings.ego,
+            settings.other,
+            settings.rules,
+            settings.dt,
+        )
+        command = report.command if settings.overrides else wish
+        pairs, broken = judge_frame(
+            ego, users, self.memory, command, curvature, settings.ego, settings.other, settings.dt
+        )
+        steering = float(nominal["steering"])
+        if command != wish:
+            if command.slip != wish.slip:
+                steering = float(np.arctan(2.0 * np.tan(command.slip)))
+            vehicle.action = {"steering": steering, "acceleration": command.acceleration}
+        elif vehicle.action is not nominal and settings.overrides:
+            vehicle.action = dict(nominal)
+        self._count(report, pairs, broken, command.acceleration - wish.acceleration, steering - nominal["steering"])
+        if self.log is not None:
+            self.log.append(Frame(ego.copy(), users.copy(), tuple(self.keys), command, curvature, self.poses.copy()))
+
+    def _count(self, report, pairs: int, broken: int, acceleration_change: float, steering_change: float) -> None:
+        tally, overrides = self.tally, self.settings.overrides
+        tally.frames += 1
+        tally.overridden += report.overridden and overrides
+        tally.limited += report.limited and overrides
+        tally.dangerous_pairs += pairs
+        tally.broken_duties += broken
+        tally.acceleration_change = max(tally.acceleration_change, abs(acceleration_change))
+        tally.steering_change = max(tally.steering_change, abs(float(steering_change)))
+        if max(report.margin_lon, report.margin_lat) < max(tally.margin_lon, tally.margin_lat):
+            tally.margin_lon, tally.margin_lat = report.margin_lon, report.margin_lat
+            tally.partner = self._index_on_road(report.partner)
+        tally.response |= report.response
+        self.frames += 1
+        self.frames_overridden += report.overridden and overrides
+        self.min_ttc = min(self.min_ttc, report.ttc)
+
+    def _index_on_road(self, i: int) -> int:
+        """Index in `road.vehicles`; static objects follow after the vehicles."""
+        road = self.vehicle.road
+        everybody = [*road.vehicles, *road.objects]
+        return next((k for k, other in enumerate(everybody) if other is self.others[i]), -1)
+
+    # -- reading the road
+
+    def _sense(self):
+        """Everybody else `[N]` and the ego as `ROAD_USER` records in the lane frame of the ego."""
+        vehicle, settings = self.vehicle, self.settings
+        road = vehicle.road
+        others = [v for v in road.vehicles if v is not vehicle]
+        others += [o for o in road.objects if not isinstance(o, Landmark) and o.collidable]
+        if others != self.others:
+            self._follow(others)
+        self._choose_frame()
+
+        everybody = [*others, vehicle]
+        poses = np.array([(*v.position, v.heading, v.speed) for v in everybody], dtype=float)
+        sizes = np.array([(v.LENGTH, v.WIDTH, hasattr(v, "action")) for v in everybody], dtype=float)
+        wrecks = np.array([v.crashed or not hasattr(v, "action") for v in everybody])
+        own_lane = np.array([self._in_own_lane(v) for v in everybody])
+        out = np.zeros(len(everybody), ROAD_USER)
+        curvature = _to_lane_frame(
+            self.road,
+            poses,
+            self.before,
+            sizes,
+            wrecks,
+            own_lane,
+            settings.rules.heading_bound,
+            settings.dt,
+            out,
+        )
+        self.before = poses[:, :2]
+        self.poses = poses
+        return out[:-1], out[-1], curvature
+
+    def _follow(self, others: list) -> None:
+        """Carry the memory over to a new set of road users, by identity."""
+        old = {id(other): i for i, other in enumerate(self.others)}
+        memory = np.zeros(len(others), MEMORY)
+        before = np.full((len(others) + 1, 2), np.nan)
+        keys = []
+        for i, other in enumerate(others):
+            k = old.get(id(other))
+            if k is None:
+                keys.append(self.seen)
+                self.seen += 1
+            else:
+                memory[i], before[i] = self.memory[k], self.before[k]
+                keys.append(self.keys[k])
+        if len(self.before):
+            before[-1] = self.before[-1]
+        self.others, self.memory, self.before, self.keys = others, memory, before, keys
+
+    def _choose_frame(self) -> None:
+        """Measure along the lane the ego is on. Where that moves everybody at once, danger is not their doing."""
+        index = self.vehicle.lane_index
+        if index == self.lane_index:
+            return
+        if index not in self.roads:
+            self.roads[index] = road_through(self.vehicle.road.network, index)
+        road = self.roads[index]
+        if self.lane_index is not None and not _same_frame(self.road, road):
+            self.memory[self.memory["since"] == 0] = np.zeros(1, MEMORY)
+        self.lane_index, self.road = index, road
+
+    def _in_own_lane(self, other) -> bool:
+        """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
+        if other.lane is None or np.cos(other.heading - self.vehicle.heading) > 0.0:
+            return True
+        s, lateral = other.lane.local_coordinates(other.position)
+        along = np.cos(other.heading - other.lane.heading_at(s)) > 0.0
+        return bool(along and abs(lateral) <= (other.lane.width_at(s) - other.WIDTH) / 2)
+
+    # -- contacts
+
+    def check_contact(self) -> bool:
+        """Has the ego touched somebody, or does highway-env predict it for the next frame?
+
+        Judged at the first such sample, before the impact displaces anybody.
+        """
+        vehicle = self.vehicle
+        if self.contact is None and (vehicle.crashed or vehicle.impact is not None):
+            self.contact = self._judge_contact()
+        return self.contact is not None
+
+    def _judge_contact(self) -> dict:
+        users, ego, _ = self._sense()
+        touching = [i for i, other in enumerate(self.others) if self._touches(other)]
+        if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
+            touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
+        settings = self.settings
+        verdicts = [
+            judge_contact(
+                ego, users[i], self.memory[i], settings.ego, settings.other, settings.rules, settings.dt
+            )
+            for i in touching
+        ]
+        # several at once: the one that weighs most against the ego counts
+        weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
+        i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: weight[VERDICTS[pair[1].verdict]])
+        return {
+            "verdict": VERDICTS[verdict.verdict],
+            "partner": self._index_on_road(i),
+            "danger": AXES[int(verdict.axes)],
+            "seconds_since_threshold": verdict.frames * settings.dt,
+            "ego_duty": DUTIES[verdict.ego_duty],
+            "ego_excess": float(verdict.ego_excess),
+            "other_duty": DUTIES[verdict.other_duty],
+            "other_excess": float(verdict.other_excess),
+        }
+
+    def _touches(self, other) -> bool:
+        """highway-env's own collision test, in its own order, without its effects."""
+        vehicle = self.vehicle
+        vehicles = vehicle.road.vehicles
+        first, second = vehicle, other
+        if other in vehicles and vehicles.index(other) < vehicles.index(vehicle):
+            first, second = other, vehicle
+        if not (first.check_collisions or second.check_collisions):
+            return False
+        touching, will_touch, _ = first._is_colliding(second, self.settings.dt)
+        return bool(touching or will_touch)
+
+
+def response_name(response: int) -> str:
+    """Name of a sum of RESPONSE_* bits."""
+    brakes = response & (RESPONSE_BRAKE | RESPONSE_CUT_IN)
+    if response & RESPONSE_STEER:
+        return "both" if brakes else "lateral"
+    return "longitudinal" if brakes else "none"

@@ -1,0 +1,17 @@
+"""Responsibility-Sensitive Safety (RSS) as compiled functions. Imports numpy and numba, nothing else."""
+
+from shield.lateral import d_min_lateral, mu_lateral_velocity
+from shield.longitudinal import d_min_longitudinal, d_min_opposite_direction, d_min_same_direction
+from shield.params import PRESETS, Preset, RSSParams, Rules
+
+__all__ = [
+    "PRESETS",
+    "Preset",
+    "RSSParams",
+    "Rules",
+    "d_min_lateral",
+    "d_min_longitudinal",
+    "d_min_opposite_direction",
+    "d_min_same_direction",
+    "mu_lateral_velocity",
+]

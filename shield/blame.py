@@ -1,0 +1,221 @@
+"""Who broke their proper response (Def. 27), judged relative to one published parameter table.
+
+A contact at time t_c has a danger threshold t_b: the last sample at which an axis was safe. The
+required distance at t_b is the sum of what each of the two may use up until they meet:
+
+  longitudinal   how far the rear car may get, less how far the front car must still get
+  lateral        how far each may come toward the other
+
+so, as long as both stay inside their own share, they cannot touch. Hence a contact always has a
+culprit: somebody drove faster, braked harder or came closer than the share allows. The ego is held
+to more than its share: its command is checked against Defs. 4 and 8 on every dangerous frame.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shield.kinematics import speed_envelope
+from shield.lateral import approach_no_credit, lateral_euler_margin
+from shield.pair import assess, sampled_approach, toward
+from shield.response import (
+    CORRECT,
+    FRONT,
+    LAT,
+    LON,
+    NEVER,
+    WRONG,
+    braking_owed,
+    lateral_speed_limit,
+    longitudinal_response,
+    owes,
+    remember,
+    role_of_ego,
+)
+
+KEPT, TOO_FAST, TOO_WEAK, TOO_HARD, TOO_CLOSE, TOWARD = range(6)
+DUTIES = (
+    "",
+    "drove faster than the proper response allows [m/s]",
+    "braked less than the proper response asks [m/s^2]",
+    "slowed down more than a_max_brake [m/s] or [m/s^2]",
+    "came closer across the lane than its share [m]",
+    "moved toward the other across the lane [m/s]",
+)
+NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
+VERDICTS = ("none", "ego", "other", "both", "inherited")
+
+_TOLERANCE = 1e-6  # rounding, in the unit of each duty
+
+
+@njit(cache=True)
+def _blame_ego(memory, duty, excess):
+    if excess > _TOLERANCE:
+        if memory.ego_broke == KEPT:
+            memory.ego_broke = duty
+        if memory.ego_broke == duty:
+            memory.ego_excess = max(memory.ego_excess, excess)
+
+
+@njit(cache=True)
+def _blame_other(memory, duty, excess):
+    if excess > _TOLERANCE:
+        if memory.other_broke == KEPT:
+            memory.other_broke = duty
+        if memory.other_broke == duty:
+            memory.other_excess = max(memory.other_excess, excess)
+
+
+@njit(cache=True)
+def judge_motion(memory, ego, user, ego_params, other_params, dt):
+    """Hold the motion of both since the threshold against their shares, on a dangerous sample."""
+    tau = memory.since * dt
+    if owes(memory, LON):
+        _judge_speeds(memory, ego, user, tau, ego_params, other_params)
+    if owes(memory, LAT):
+        allowed = lateral_speed_limit(memory.since - 1, memory.w_ego, ego_params, dt)
+        if memory.age > 1:
+            _blame_ego(memory, TOWARD, memory.side * ego.u - allowed)
+        _blame_other(
+            memory, TOO_CLOSE, memory.approach_other - sampled_approach(memory.w_other, other_params, dt)
+        )
+
+
+@njit(cache=True)
+def _judge_speeds(memory, ego, user, tau, ego_params, other_params):
+    role = role_of_ego(memory)
+    if role == FRONT:
+        slowest = max(memory.v_ego - ego_params.a_max_brake * tau, 0.0)
+        _blame_ego(memory, TOO_HARD, slowest - ego.speed * np.cos(ego.heading))
+        if not memory.opposite:
+            fastest = _fastest(tau, memory.v_other, other_params, other_params.a_min_brake)
+            _blame_other(memory, TOO_FAST, user.speed - fastest)
+        return
+    fastest = _fastest(tau, memory.v_ego, ego_params, braking_owed(role, ego_params))
+    _blame_ego(memory, TOO_FAST, ego.speed - fastest)
+    if memory.opposite:
+        braking = braking_owed(WRONG if role == CORRECT else CORRECT, other_params)
+        fastest = _fastest(tau, -memory.v_other, other_params, braking)
+        _blame_other(memory, TOO_FAST, user.speed - fastest)
+    else:
+        slowest = max(memory.v_other - other_params.a_max_brake * tau, 0.0)
+        _blame_other(memory, TOO_HARD, slowest - user.speed * np.cos(user.heading))
+
+
+@njit(cache=True)
+def _fastest(tau, v, params, braking):
+    return speed_envelope(tau, max(v, 0.0), params.response_time, params.a_max_accel, braking)
+
+
+@njit(cache=True)
+def audit_command(memory, ego, command, drift, params, dt):
+    """Did the ego's command keep its duty toward one road user on one dangerous frame?
+
+    Args:
+      memory: `MEMORY` record after this sample, since > 0.
+      ego: `ROAD_USER` record.
+      command: executed `Command` of the frame.
+      drift: lateral speed at which a curved lane leaves its tangent during the frame [m/s].
+      params: `RSSParams` of the ego.
+      dt: length of the frame [s].
+
+    Returns:
+      (duty, excess): index into `DUTIES`, 0 = kept, and how much it was broken by.
+    """
+    a = command.acceleration
+    if owes(memory, LON):
+        role = role_of_ego(memory)
+        lower, upper = longitudinal_response(role, memory.since * dt, ego.speed, params)
+        stops = ego.speed + a * dt <= _TOLERANCE  # the last braking step is partial
+        if a - upper > _TOLERANCE and not (stops and upper < 0.0):
+            return TOO_WEAK, a - upper
+        if role == FRONT and lower - a > _TOLERANCE:
+            return TOO_HARD, lower - a
+    if owes(memory, LAT):
+        u = ego.speed * np.sin(ego.heading + command.slip) - drift
+        excess = memory.side * u - lateral_speed_limit(memory.since, memory.w_ego, params, dt)
+        if excess > _TOLERANCE:
+            return TOWARD, excess
+    return KEPT, 0.0
+
+
+@njit(cache=True)
+def judge_frame(ego, users, memory, command, curvature, ego_params, other_params, dt):
+    """Judge one frame of all pairs after `shield_frame` has updated their memory.
+
+    Args:
+      ego, users, memory: as in `shield_frame`; the verdict so far is kept in `memory`.
+      command: `Command` that the ego executes on this frame.
+      curvature: of the lane at the ego [1/m].
+
+    Returns:
+      (pairs, broken): dangerous pairs on this frame, and those whose duty the ego broke on it.
+    """
+    drift = 0.5 * curvature * ego.speed**2 * dt
+    pairs = broken = 0
+    for i in range(len(users)):
+        if memory[i].since > 0:
+            judge_motion(memory[i], ego, users[i], ego_params, other_params, dt)
+            duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
+            _blame_ego(memory[i], duty, excess)
+            pairs += 1
+            broken += duty != KEPT
+    return pairs, broken
+
+
+class Verdict(NamedTuple):
+    """Who is to blame for a contact, with the evidence."""
+
+    verdict: int  # index into VERDICTS
+    axes: int  # axes safe at the threshold: kind of danger (`response.NEVER | LON | LAT`)
+    frames: int  # from the threshold to the contact
+    ego_duty: int  # first duty broken, index into DUTIES
+    ego_excess: float
+    other_duty: int
+    other_excess: float
+
+
+@njit(cache=True)
+def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
+    """Verdict at the first contact of the ego with one road user (Def. 27).
+
+    Args:
+      ego, user: `ROAD_USER` records at the sample at which contact exists or is predicted for the
+        next frame, before any impact displaces the cars.
+      memory: `MEMORY` record after the previous sample.
+
+    Returns:
+      `Verdict`. "inherited": never safe since first sight and the ego responded properly all the
+      time. "none" must not happen: a margin is missing.
+    """
+    pair = assess(ego, user, ego_params, other_params, rules, dt)
+    remember(memory, pair, ego, user, dt)
+    if memory.since > 0:
+        judge_motion(memory, ego, user, ego_params, other_params, dt)
+        if owes(memory, LAT):
+            # the simulator extrapolates both along their headings by one frame
+            share = sampled_approach(memory.w_other, other_params, dt)
+            next_step = toward(-memory.side, user) * dt
+            _blame_other(memory, TOO_CLOSE, memory.approach_other + max(next_step, 0.0) - share)
+            share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
+            next_step = toward(memory.side, ego) * dt
+            _blame_ego(memory, TOO_CLOSE, memory.approach_ego + max(next_step, 0.0) - share)
+    ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
+    if memory.since == 0:
+        verdict = NOBODY
+    elif memory.axes == NEVER:
+        verdict = EGO if ego_broke else INHERITED
+    elif ego_broke:
+        verdict = BOTH if other_broke else EGO
+    else:
+        verdict = OTHER if other_broke else NOBODY
+    return Verdict(
+        verdict,
+        memory.axes,
+        memory.since,
+        memory.ego_broke,
+        memory.ego_excess,
+        memory.other_broke,
+        memory.other_excess,
+    )

@@ -1,0 +1,164 @@
+"""One frame of the shield: scene + memory + nominal command -> restricted command + report."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shield.pair import assess, toward
+from shield.response import LAT, Bounds, merge, owes, owes_braking, remember
+
+
+class Command(NamedTuple):
+    """What the ego does during one frame."""
+
+    acceleration: float  # [m/s^2]
+    slip: float  # angle between heading and motion, positive turns right [rad]
+
+
+class Report(NamedTuple):
+    """What the shield saw and did on one frame."""
+
+    command: Command  # what it lets through
+    overridden: bool  # a duty toward somebody changed the command
+    limited: bool  # only the always-on limits did
+    dangerous: bool
+    partner: int  # index of the road user nearest to danger, -1 if alone
+    margin_lon: float  # of that pair [m]; inf if alone
+    margin_lat: float
+    response: int  # sum of RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN
+    ttc: float  # time to collision with a car ahead in the way of the ego [s]; inf if none
+
+
+RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN = 1, 2, 4
+
+
+class Body(NamedTuple):
+    """What the ego's kinematics add to its `ROAD_USER` record."""
+
+    half_wheelbase: float  # distance from the centre to the rear axle [m]
+    max_slip: float  # largest slip angle the steering reaches [rad]
+    curvature: float  # of the lane at the ego, positive turns right [1/m]
+
+
+@njit(cache=True)
+def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, rules, dt):
+    """Restrict the ego's nominal command to what RSS permits on this frame.
+
+    Acceleration is clipped after the ego's own controller; an override brakes directly. Steering is
+    chosen so that the lateral speed of this frame, the one that the new heading commits to, and the
+    heading itself stay inside their bounds.
+
+    Args:
+      ego: `ROAD_USER` record.
+      users: `[N]` `ROAD_USER` records of everybody else.
+      memory: `[N]` `MEMORY` records, changed in place.
+      nominal: `Command` of the ego's own controller.
+      body: `Body` of the ego.
+      ego_params, other_params: `RSSParams`, response times in whole frames.
+      rules: `Rules` in force.
+      dt: length of a frame [s].
+
+    Returns:
+      `Report`.
+    """
+    free = always_on(ego, ego_params, rules, dt)
+    bounds = free
+    worst, partner, margin_lon, margin_lat, ttc = np.inf, -1, np.inf, np.inf, np.inf
+    dangerous, response = False, 0
+    for i in range(len(users)):
+        pair = assess(ego, users[i], ego_params, other_params, rules, dt)
+        remember(memory[i], pair, ego, users[i], dt)
+        bounds = merge(bounds, memory[i], pair, ego_params, rules, dt)
+        if memory[i].since > 0:
+            dangerous = True
+            braking = owes_braking(memory[i], pair, rules)
+            response |= RESPONSE_BRAKE if braking == 1 else (RESPONSE_CUT_IN if braking == 2 else 0)
+            response |= RESPONSE_STEER if rules.lateral and owes(memory[i], LAT) else 0
+        nearest = max(pair.margin_lon, pair.margin_lat)
+        if nearest < worst:
+            worst, partner, margin_lon, margin_lat = nearest, i, pair.margin_lon, pair.margin_lat
+        if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
+            ttc = min(ttc, max(pair.gap_lon, 0.0) / (pair.v_ego - pair.v_other))
+
+    limited = restrict(nominal, free, ego, body, rules, dt)
+    command = restrict(nominal, bounds, ego, body, rules, dt)
+    overridden = command != limited
+    return Report(
+        command,
+        overridden,
+        limited != nominal and not overridden,
+        dangerous,
+        partner,
+        margin_lon,
+        margin_lat,
+        response,
+        ttc,
+    )
+
+
+@njit(cache=True)
+def always_on(ego, params, rules, dt):
+    """Limits that hold even where nobody is in danger (conditions C1, C1y of the sampled proof)."""
+    if not rules.limits:
+        return Bounds(-np.inf, np.inf, np.inf, np.inf, np.inf, np.inf)
+    cap = max((params.v_cap - ego.speed) / dt, 0.0)
+    growth = params.a_lat_max_accel * dt
+    left, right = max(toward(-1.0, ego), 0.0) + growth, max(toward(1.0, ego), 0.0) + growth
+    return Bounds(-params.a_max_brake, min(params.a_max_accel, cap), left, right, left, right)
+
+
+@njit(cache=True)
+def restrict(nominal, bounds, ego, body, rules, dt):
+    """The command nearest to the nominal one inside the bounds."""
+    a = min(max(nominal.acceleration, bounds.a_lower), bounds.a_upper)
+    if bounds.a_lower > -np.inf:
+        a = max(a, -max(ego.speed, 0.0) / dt)  # never reverse; the last braking step is partial
+    return Command(a, _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt))
+
+
+@njit(cache=True)
+def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
+    """Slip angle nearest to the nominal one inside the lateral bounds [rad].
+
+    With psi the heading relative to the lane, slip beta moves the car sideways at v sin(psi + beta)
+    at once and turns it by G sin(beta), G = v dt / half_wheelbase. For G > 1 the heading overshoots,
+    for G > 2 holding the lateral speed alone makes it diverge: so the lateral speed of this frame, the
+    one that the next heading commits to and the heading are bounded together. The three
+    intervals always share the slip that straightens the car (see `_straightening_slip`): it moves
+    the car no faster than its heading already does, so no bound that was kept so far is lost.
+    """
+    v = ego.speed
+    if v < 0.01 or bounds.left == np.inf:
+        return slip
+    v_next = max(v + a * dt, 0.01)
+    psi, gain = ego.heading, v * dt / body.half_wheelbase
+    turned = body.curvature * v * dt  # the lane turns under the car during the frame ...
+    drift = 0.5 * turned * v  # ... and curves away from its tangent [m/s]
+    neutral = _straightening_slip(psi, turned, drift / v, gain)
+
+    # lateral speed of this frame: -left <= v sin(psi + slip) - drift <= right
+    low = min(_arcsin((-bounds.left + drift) / v) - psi, neutral)
+    high = max(_arcsin((bounds.right + drift) / v) - psi, neutral)
+    # heading after this frame, by the speed it commits to and by the heading bound
+    psi_low, psi_high = _arcsin(-bounds.left_next / v_next), _arcsin(bounds.right_next / v_next)
+    if rules.heading_bound < 1.0:
+        largest = np.arcsin(rules.heading_bound)
+        psi_low, psi_high = max(psi_low, -largest), min(psi_high, largest)
+    low = max(low, min(_arcsin((psi_low - psi + turned) / gain), neutral))
+    high = min(high, max(_arcsin((psi_high - psi + turned) / gain), neutral))
+    low, high = max(low, -body.max_slip), min(high, body.max_slip)
+    return min(max(slip, low), high)
+
+
+@njit(cache=True)
+def _straightening_slip(psi, turned, drift, gain):
+    """Slip that ends the sideways motion: now where that leaves the heading calm, else by the next frame [rad]."""
+    if gain <= 1.0:
+        return _arcsin(drift) - psi
+    return _arcsin((turned - psi) / gain)
+
+
+@njit(cache=True)
+def _arcsin(x):
+    return np.arcsin(min(max(x, -1.0), 1.0))

@@ -1,0 +1,63 @@
+"""How far a car gets: the distances behind every RSS definition.
+
+All functions take floats or arrays that broadcast, in SI units, and are compiled.
+"""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def speed_after_response(v, rho, a, v_cap):
+    """Speed after accelerating at `a` for `rho`, never beyond `v_cap` [m/s]. A faster car keeps its speed."""
+    return np.minimum(v + a * rho, np.maximum(v_cap, v))
+
+
+@njit(cache=True)
+def response_distance(v, rho, a, v_cap):
+    """Distance covered while accelerating at `a` for `rho`, speed limited to `v_cap` [m], for v >= 0."""
+    v_rho = speed_after_response(v, rho, a, v_cap)
+    ramp = (v_rho - v) / np.where(a > 0.0, a, 1.0)  # time until the cap is reached
+    return 0.5 * (v + v_rho) * ramp + v_rho * (rho - ramp)
+
+
+@njit(cache=True)
+def stopping_distance(v, b):
+    """Distance to rest from speed `v` >= 0 with braking `b` > 0 [m]."""
+    return v**2 / (2 * b)
+
+
+@njit(cache=True)
+def reach(v, rho, a, b, v_cap):
+    """Distance covered by "accelerate at `a` for `rho`, then brake at `b` to rest" from v >= 0 [m]."""
+    v_rho = speed_after_response(v, rho, a, v_cap)
+    return response_distance(v, rho, a, v_cap) + stopping_distance(v_rho, b)
+
+
+@njit(cache=True)
+def forward_reach(v, rho, a, b):
+    """Largest displacement ever reached in the positive direction, for any sign of `v` [m].
+
+    The car accelerates at `a` for `rho` and then brakes at `b`; if it moves backwards at first it
+    counts only from where it started, never less than 0. On the lateral axis this is one car's
+    approach e(w) of Lemma 4; on the longitudinal one it makes Lemma 2 and 3 total.
+    """
+    v_rho = v + a * rho
+    end = v * rho + 0.5 * a * rho**2 + np.maximum(v_rho, 0.0) ** 2 / (2 * b)
+    return np.maximum(end, 0.0)
+
+
+@njit(cache=True)
+def speed_envelope(tau, v, rho, a, b):
+    """Fastest speed a driver may have `tau` after the danger threshold [m/s].
+
+    Accelerate at `a` during `rho`, then brake at `b` to rest (first phase and second phase of the
+    proper responses, Defs. 4 and 8), starting from `v` >= 0.
+    """
+    return np.maximum(v + a * np.minimum(tau, rho) - b * np.maximum(tau - rho, 0.0), 0.0)
+
+
+@njit(cache=True)
+def frames_for(duration, dt):
+    """A duration rounded up to whole frames of length `dt`, in frames (condition C2)."""
+    return np.ceil(duration / dt - 1e-9)

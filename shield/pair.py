@@ -1,0 +1,138 @@
+"""One ego-other pair in the lane frame of the ego: gaps, speeds, and whether each axis is safe."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shield.geometry import signed_gap
+from shield.lateral import approach_no_credit, d_min_lateral, lateral_euler_margin
+from shield.longitudinal import d_min_longitudinal, euler_margin, is_safe_longitudinally
+
+# One road user in the lane frame of the ego. SI units; lateral values positive to the right.
+ROAD_USER = np.dtype(
+    [
+        ("s", "f8"),  # arc length of the centre
+        ("y", "f8"),  # lateral offset of the centre
+        ("heading", "f8"),  # relative to the lane
+        ("speed", "f8"),  # along its own heading, negative in reverse
+        ("u", "f8"),  # lateral speed over the last frame, slip included
+        ("half_length", "f8"),
+        ("half_width", "f8"),
+        ("in_own_lane", "?"),  # drives in a lane meant for its direction
+        ("wreck", "?"),  # has crashed, or never moves: it may stop on the spot
+    ],
+    align=True,
+)
+
+
+class Pair(NamedTuple):
+    """What Defs. 1-9 say about the ego and one other road user now."""
+
+    safe_lon: bool
+    safe_lat: bool
+    margin_lon: float  # gap minus required gap [m]
+    margin_lat: float
+    gap_lon: float  # [m]
+    gap_lat: float
+    ego_is_rear: bool
+    opposite: bool  # they drive in opposite directions
+    side: float  # +1 the other is on the right of the ego, -1 on the left
+    v_ego: float  # speeds along the lane, in the ego's direction, as the distance assumes them [m/s]
+    v_other: float
+    w_ego: float  # speeds toward each other across the lane, not negative [m/s]
+    w_other: float
+
+
+@njit(cache=True)
+def toward(side, user):
+    """Lateral speed toward `side`: the larger of the last frame's and the one the heading commits to [m/s].
+
+    The slip angle acts at once, so the speed of the last frame alone hides what the next one does.
+    """
+    return max(side * user.u, side * user.speed * np.sin(user.heading))
+
+
+@njit(cache=True)
+def assess(ego, user, ego_params, other_params, rules, dt):
+    """Evaluate both axes of one pair on one frame.
+
+    Args:
+      ego, user: `ROAD_USER` records.
+      ego_params, other_params: `RSSParams`, response times in whole frames.
+      rules: `Rules` in force.
+      dt: length of a frame [s].
+
+    Returns:
+      `Pair`.
+    """
+    ego_is_rear = user.s >= ego.s
+    opposite = np.cos(user.heading) < 0.0
+    side = 1.0 if user.y >= ego.y else -1.0
+    gap_lon = signed_gap(user.s - ego.s, ego.half_length, user.half_length)
+    gap_lat = signed_gap(user.y - ego.y, ego.half_width, user.half_width)
+
+    v_ego, v_other, d_lon = _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt)
+
+    w_ego, w_other = toward(side, ego), toward(-side, user)
+    reading = "no_credit" if rules.no_credit else "pair"
+    d_lat = d_min_lateral(w_ego, -w_other, ego_params, other_params, reading)
+    w_ego, w_other = max(w_ego, 0.0), max(w_other, 0.0)
+    if rules.discretisation_margin:
+        d_lat += lateral_euler_margin(w_ego, ego_params, dt)
+        d_lat += sampled_approach(w_other, other_params, dt) - approach_no_credit(w_other, other_params)
+    d_lat += rules.overlap_margin
+
+    return Pair(
+        is_safe_longitudinally(gap_lon, d_lon),
+        gap_lat >= d_lat,
+        gap_lon - d_lon,
+        gap_lat - d_lat,
+        gap_lon,
+        gap_lat,
+        ego_is_rear,
+        opposite,
+        side,
+        v_ego,
+        v_other,
+        w_ego,
+        w_other,
+    )
+
+
+@njit(cache=True)
+def sampled_approach(w, car, dt):
+    """Farthest a compliant car may come, sampled every `dt`, from speed `w` toward its neighbour [m]."""
+    w = max(w, 0.0)
+    return approach_no_credit(w, car) + w * dt / 2 + car.a_lat_min_brake * dt**2 / 8
+
+
+@njit(cache=True)
+def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt):
+    """Speeds along the lane as Def. 1 or 2 must assume them, and the required gap."""
+    # A follower may turn back into the lane at any time: its whole speed counts. A leader may turn
+    # within the heading bound while it brakes, and a wreck may stop on the spot.
+    shortest = np.sqrt(1.0 - rules.heading_bound**2) if rules.heading_bound < 1.0 else 1.0
+    if opposite:
+        v_ego, v_other = ego.speed, -user.speed
+    elif ego_is_rear:
+        v_ego = ego.speed
+        v_other = user.speed * min(np.cos(user.heading), shortest)
+    else:
+        v_ego = ego.speed * min(np.cos(ego.heading), shortest)
+        v_other = user.speed
+    if user.wreck and ego_is_rear:
+        v_other = min(v_other, 0.0)
+
+    b_ego = ego_params.a_min_brake_correct if opposite and not user.in_own_lane else ego_params.a_min_brake
+    b_other = other_params.a_min_brake_correct if opposite and user.in_own_lane else other_params.a_min_brake
+    if ego_is_rear:
+        d = d_min_longitudinal(v_ego, v_other, opposite, ego_params, other_params, b_ego, b_other)
+        closing = v_ego - v_other
+    else:
+        d = d_min_longitudinal(v_other, v_ego, opposite, other_params, ego_params, b_other, b_ego)
+        closing = v_other - v_ego
+    if rules.discretisation_margin:
+        b = ego_params.a_min_brake + other_params.a_min_brake
+        d += euler_margin(closing, 0.0, b, dt)
+    return v_ego, v_other, d

@@ -1,0 +1,196 @@
+"""What every driver is assumed to do: the one published table that safety and blame refer to.
+
+Symbols as in Shalev-Shwartz, Shammah, Shashua, "On a Formal Model of Safe and Scalable Self-driving
+Cars" (arXiv:1708.06374). Braking parameters are positive magnitudes.
+"""
+
+import math
+from typing import NamedTuple
+
+
+class RSSParams(NamedTuple):
+    """RSS parameters of one driver. A NamedTuple of floats passes straight into compiled code."""
+
+    response_time: float  # rho                [s]      delay before a driver must have reacted
+    a_max_accel: float  # a_max,accel        [m/s^2]  strongest forward acceleration
+    a_min_brake: float  # a_min,brake        [m/s^2]  weakest braking we may rely on
+    a_max_brake: float  # a_max,brake        [m/s^2]  hardest braking a leader may apply
+    a_min_brake_correct: float  # a_min,brake,correct [m/s^2] braking asked of the car in its own lane
+    a_lat_max_accel: float  # a_max,accel^lat    [m/s^2]  strongest lateral acceleration
+    a_lat_min_brake: float  # a_min,brake^lat    [m/s^2]  weakest lateral braking
+    mu: float  # mu                 [m]      lateral wobble width
+    standstill_gap: float  # lambda             [m]      gap left when both stand
+    v_cap: float  # v_cap              [m/s]    speed above which nobody accelerates
+
+    @classmethod
+    def validated(cls, **fields: float) -> "RSSParams":
+        """Build parameters from keyword arguments and check each one.
+
+        Raises:
+          ValueError: a field is missing, unknown, not a finite number or outside its range; the
+            message names field, value and range.
+        """
+        for name in fields:
+            if name not in cls._fields:
+                raise ValueError(f"unknown RSS parameter {name!r}; expected one of {', '.join(cls._fields)}")
+        values = {}
+        for name, (low, strict) in _RANGES.items():
+            if name not in fields:
+                raise ValueError(f"RSS parameter {name} is missing")
+            try:
+                value = float(fields[name])
+            except (TypeError, ValueError):
+                raise ValueError(f"{name} = {fields[name]!r} is not a number") from None
+            finite = not math.isnan(value) and (name == "v_cap" or not math.isinf(value))
+            if not finite or value < low or (strict and value == low):
+                accepted = f"> {low:g}" if strict else f">= {low:g}"
+                raise ValueError(f"{name} = {fields[name]!r} is out of range: expected a finite number {accepted}")
+            values[name] = value
+        params = cls(**values)
+        _check_order(params, "a_min_brake", "a_max_brake")
+        _check_order(params, "a_min_brake_correct", "a_min_brake")
+        return params
+
+
+# lower end of each range, and whether that end is excluded
+_RANGES = {
+    "response_time": (0.0, True),
+    "a_max_accel": (0.0, False),
+    "a_min_brake": (0.0, True),
+    "a_max_brake": (0.0, True),
+    "a_min_brake_correct": (0.0, True),
+    "a_lat_max_accel": (0.0, False),
+    "a_lat_min_brake": (0.0, True),
+    "mu": (0.0, False),
+    "standstill_gap": (0.0, False),
+    "v_cap": (0.0, True),
+}
+
+
+def _check_order(params: RSSParams, smaller: str, larger: str) -> None:
+    low, high = getattr(params, smaller), getattr(params, larger)
+    if low > high:
+        raise ValueError(f"{smaller} = {low:g} is out of range: expected at most {larger} = {high:g}")
+
+
+class Preset(NamedTuple):
+    """Parameters of the ego and of everybody else, and where they come from.
+
+    `per_frame` says that the ego's response time means "as fast as the simulator allows": it is
+    raised to one simulation frame where a frame is longer. Without it, a response time below one
+    frame is an error, because no shield can react faster than it is called.
+    """
+
+    ego: RSSParams
+    other: RSSParams
+    source: str
+    per_frame: bool = False
+
+
+def _slides(**changes: float) -> RSSParams:
+    fields = dict(
+        response_time=1.0,
+        a_max_accel=3.5,
+        a_min_brake=4.0,
+        a_max_brake=8.0,
+        a_min_brake_correct=4.0,
+        a_lat_max_accel=0.2,
+        a_lat_min_brake=0.8,
+        mu=0.1,
+        standstill_gap=1.0,
+        v_cap=math.inf,
+    )
+    return RSSParams.validated(**(fields | changes))
+
+
+def _simulator(response_time: float) -> RSSParams:
+    return RSSParams.validated(
+        response_time=response_time,
+        a_max_accel=3.0,
+        a_min_brake=5.0,
+        a_max_brake=6.0,
+        a_min_brake_correct=3.0,
+        a_lat_max_accel=1.0,
+        a_lat_min_brake=1.5,
+        mu=0.1,
+        standstill_gap=1.0,
+        v_cap=40.0,
+    )
+
+
+def _both(params: RSSParams, source: str) -> Preset:
+    return Preset(params, params, source)
+
+
+PRESETS: dict[str, Preset] = {
+    "simulator": Preset(
+        ego=_simulator(response_time=2 / 15),
+        other=_simulator(response_time=1.0),
+        source="limits of highway-env (IDM brakes at 6 m/s^2 at most); the ego reacts within two frames at 15 Hz",
+        per_frame=True,
+    ),
+    "slides": Preset(
+        ego=_slides(),
+        other=_slides(response_time=2.0),
+        source="parameter table of the RSS lecture slides (head-on: both brake at a_min_brake)",
+    ),
+    "ad-rss": Preset(
+        ego=_slides(a_min_brake_correct=3.0, standstill_gap=0.0, v_cap=100.0),
+        other=_slides(response_time=2.0, a_min_brake_correct=3.0, standstill_gap=0.0, v_cap=100.0),
+        source="ad-rss-lib 5.0.0, parameter discussion (conservative start)",
+    ),
+    "carla": Preset(
+        ego=_slides(response_time=0.5, a_max_accel=5.0, a_min_brake_correct=3.0, standstill_gap=0.0, v_cap=100.0),
+        other=_slides(response_time=0.5, a_max_accel=5.0, a_min_brake_correct=3.0, standstill_gap=0.0, v_cap=100.0),
+        source="CARLA, Python example of the RSS sensor (vehicles)",
+    ),
+    "rodionova-conservative": _both(
+        RSSParams.validated(
+            response_time=1.94,
+            a_max_accel=5.91,
+            a_min_brake=4.13,
+            a_max_brake=9.50,
+            a_min_brake_correct=1.86,
+            a_lat_max_accel=0.45,
+            a_lat_min_brake=0.86,
+            mu=0.07,
+            standstill_gap=0.0,
+            v_cap=math.inf,
+        ),
+        source="Rodionova et al., IEEE IV 2020 (9304756), mined in CARLA, 'conservative'",
+    ),
+    "rodionova-assertive": _both(
+        RSSParams.validated(
+            response_time=0.53,
+            a_max_accel=4.10,
+            a_min_brake=4.64,
+            a_max_brake=8.03,
+            a_min_brake_correct=1.76,
+            a_lat_max_accel=0.43,
+            a_lat_min_brake=0.96,
+            mu=0.07,
+            standstill_gap=0.0,
+            v_cap=math.inf,
+        ),
+        source="Rodionova et al., IEEE IV 2020 (9304756), mined in CARLA, 'assertive'",
+    ),
+}
+
+
+class Rules(NamedTuple):
+    """Which duties and margins are in force: the second half of the published table.
+
+    The default is the shield with its proof. Switching something off is for ablations; each switch
+    costs the guarantee, and a test shows for each how the guarantee is lost.
+    """
+
+    longitudinal: bool = True  # answer lost longitudinal distance by braking (Def. 4)
+    lateral: bool = True  # answer lost lateral distance by stopping laterally (Def. 8)
+    limits: bool = True  # always-on limits of acceleration and lateral speed (C1, C1y)
+    memory: bool = True  # respond on the axis that was safe last (C7); off: on the longitudinal one
+    no_credit: bool = True  # lateral distance without credit for receding (hole H22)
+    brake_behind_cut_in: bool = True  # also brake behind a car that cuts in (hole H6)
+    brake_if_inherited: bool = True  # brake at a_max_brake where danger was never anybody's doing
+    heading_bound: float = 0.1  # largest sine of the angle between car and lane [1]; 1 = no bound
+    discretisation_margin: bool = True  # C5: explicit Euler, the last partial braking step
+    overlap_margin: float = 0.1  # the simulator flags *predicted* contact, with slip left out [m]

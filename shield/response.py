@@ -1,0 +1,239 @@
+"""Danger, its threshold, and the proper response (Defs. 3, 4, 7-10) with the merge over all neighbours.
+
+The memory of one pair is a record that is passed in and returned changed; `[N]` of them, one per
+road user, make up the memory of a scene. A new record is all zeros.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shield.kinematics import speed_envelope
+
+NEVER, LON, LAT = 0, 1, 2  # axes that were safe at the last safe sample; LON | LAT is both
+
+MEMORY = np.dtype(
+    [
+        ("age", "i8"),  # frames since first sight, 0 = not seen yet
+        ("since", "i8"),  # frames since the last safe sample; 0 = safe now
+        ("axes", "i8"),  # axes safe at that sample; NEVER = danger from the start
+        # roles and state at the threshold t_b (at first sight where danger was there from the start)
+        ("ego_is_rear", "?"),
+        ("opposite", "?"),
+        ("in_own_lane", "?"),  # the other, in a head-on pair
+        ("side", "f8"),
+        ("v_ego", "f8"),
+        ("v_other", "f8"),
+        ("w_ego", "f8"),
+        ("w_other", "f8"),
+        # how far their sides came toward each other across the lane since t_b, and half widths now [m]
+        ("approach_ego", "f8"),
+        ("approach_other", "f8"),
+        ("half_ego", "f8"),
+        ("half_other", "f8"),
+        # first duty that each broke since t_b (`blame.DUTIES`) and the most it was broken by
+        ("ego_broke", "i8"),
+        ("ego_excess", "f8"),
+        ("other_broke", "i8"),
+        ("other_excess", "f8"),
+    ],
+    align=True,
+)
+
+
+@njit(cache=True)
+def step_threshold(axes, since, safe_lon, safe_lat):
+    """Danger threshold of one pair, one sample on (Defs. 3, 7, 9, 10).
+
+    A sample is dangerous iff both axes are unsafe; the threshold t_b is the last sample that was
+    not, and the axes that were safe there are the ones to respond on.
+
+    Args:
+      axes, since: as in `MEMORY`, after the previous sample.
+      safe_lon, safe_lat: is each axis safe now?
+
+    Returns:
+      (axes, since) after this sample. Dangerous iff since > 0.
+    """
+    if safe_lon or safe_lat:
+        return (LON if safe_lon else NEVER) | (LAT if safe_lat else NEVER), 0
+    return axes, since + 1
+
+
+@njit(cache=True)
+def remember(memory, pair, ego, user, dt):
+    """Carry one pair's memory over to this sample, in place."""
+    memory.axes, memory.since = step_threshold(memory.axes, memory.since, pair.safe_lon, pair.safe_lat)
+    if memory.since == 0 or memory.age == 0:
+        memory.ego_is_rear, memory.opposite = pair.ego_is_rear, pair.opposite
+        memory.in_own_lane = user.in_own_lane
+        memory.side = pair.side
+        memory.v_ego, memory.v_other = pair.v_ego, pair.v_other
+        memory.w_ego, memory.w_other = pair.w_ego, pair.w_other
+        memory.approach_ego = memory.approach_other = 0.0
+        memory.ego_broke = memory.other_broke = 0
+        memory.ego_excess = memory.other_excess = 0.0
+    else:
+        memory.approach_ego += memory.side * ego.u * dt + ego.half_width - memory.half_ego
+        memory.approach_other += -memory.side * user.u * dt + user.half_width - memory.half_other
+    memory.half_ego, memory.half_other = ego.half_width, user.half_width
+    memory.age += 1
+
+
+@njit(cache=True)
+def owes(memory, axis):
+    """Does this pair owe a response on `axis` now? Danger from the start is answered on both."""
+    return memory.since > 0 and (memory.axes == NEVER or (memory.axes & axis) != 0)
+
+
+# ---------------------------------------------------------------- longitudinal: Def. 4
+
+REAR, FRONT, CORRECT, WRONG = 0, 1, 2, 3
+
+
+@njit(cache=True)
+def role_of_ego(memory):
+    """Longitudinal role of the ego at the threshold: REAR, FRONT, CORRECT or WRONG."""
+    if memory.opposite:
+        # cars that have passed each other owe nothing more than not to reverse
+        if not memory.ego_is_rear:
+            return FRONT
+        return WRONG if memory.in_own_lane else CORRECT
+    return REAR if memory.ego_is_rear else FRONT
+
+
+@njit(cache=True)
+def braking_owed(role, params):
+    """Braking asked of a driver after the response time [m/s^2]; 0 for the car in front."""
+    if role == FRONT:
+        return 0.0
+    return params.a_min_brake_correct if role == CORRECT else params.a_min_brake
+
+
+@njit(cache=True)
+def longitudinal_response(role, tau, v, params):
+    """Accelerations a driver may choose in danger, in the own driving direction (Def. 4).
+
+    After standstill the car holds: reversing out of one danger would make another (hole H12).
+
+    Args:
+      role: REAR, FRONT, CORRECT or WRONG at the threshold.
+      tau: time since the threshold [s].
+      v: own speed [m/s], >= 0.
+      params: `RSSParams` of the driver.
+
+    Returns:
+      (lower, upper) [m/s^2]; upper is inf where nothing bounds it.
+    """
+    if role == FRONT:
+        return -params.a_max_brake, np.inf
+    if tau < params.response_time:
+        return -params.a_max_brake, params.a_max_accel
+    if v <= 0.0:
+        return 0.0, 0.0
+    return -params.a_max_brake, -braking_owed(role, params)
+
+
+# ---------------------------------------------------------------- lateral: Def. 8
+
+
+@njit(cache=True)
+def lateral_response(side, tau, u, params):
+    """Lateral proper response as published, two-sided, read directionally (Def. 8, hole H11).
+
+    For comparison with the literature; the shield uses `lateral_speed_limit`.
+
+    Args:
+      side: +1 the driver is the right car of the pair, -1 the left one.
+      tau: time since the threshold [s].
+      u: own mu-lateral velocity, positive to the right [m/s].
+      params: `RSSParams` of the driver.
+
+    Returns:
+      (a_lower, a_upper, u_lower, u_upper): bounds on lateral acceleration [m/s^2] and velocity [m/s].
+    """
+    if tau < params.response_time:
+        return -params.a_lat_max_accel, params.a_lat_max_accel, -np.inf, np.inf
+    moves_toward = side * u < 0.0
+    if side < 0.0:
+        if moves_toward:
+            return -np.inf, -params.a_lat_min_brake, -np.inf, np.inf
+        return -np.inf, np.inf, -np.inf, 0.0
+    if moves_toward:
+        return params.a_lat_min_brake, np.inf, -np.inf, np.inf
+    return -np.inf, np.inf, 0.0, np.inf
+
+
+@njit(cache=True)
+def lateral_speed_limit(frame, w_threshold, params, dt):
+    """Fastest a driver may move toward the neighbour during a frame (one-sided Def. 8, hole H22) [m/s].
+
+    w_b + a rho during the response time, then falling at `a_lat_min_brake` to 0 for good. Any set of
+    neighbours can be obeyed at once, because moving away or stopping is never forbidden.
+
+    Args:
+      frame: frames since the threshold; 0 is the frame that starts at it.
+      w_threshold: speed toward the neighbour at the threshold, >= 0 [m/s].
+      params: `RSSParams` of the driver, response time in whole frames.
+      dt: length of a frame [s].
+    """
+    tau = frame * dt
+    if tau < params.response_time - 1e-9:
+        tau = min(tau + dt, params.response_time)
+    return speed_envelope(tau, w_threshold, params.response_time, params.a_lat_max_accel, params.a_lat_min_brake)
+
+
+# ---------------------------------------------------------------- merge over all neighbours: Def. 10
+
+
+class Bounds(NamedTuple):
+    """What the ego may command this frame. Signed; lateral speeds are limits toward each side."""
+
+    a_lower: float  # [m/s^2]
+    a_upper: float
+    left: float  # largest lateral speed to the left during this frame, >= 0 [m/s]
+    right: float
+    left_next: float  # the same for the speed the new heading commits to
+    right_next: float
+
+
+CUT_IN_SPEED = 0.1  # a car ahead counts as cutting in when it comes closer at this speed [m/s] ...
+CUT_IN_GAP = 0.3  # ... or is nearer than this across the lane [m]
+
+
+@njit(cache=True)
+def owes_braking(memory, pair, rules):
+    """Must the ego brake for this pair? Returns the reason: 0 none, 1 Def. 4, 2 behind a cut-in (H6)."""
+    if memory.since == 0:
+        return 0
+    axes = memory.axes if rules.memory else LON
+    if rules.longitudinal and (axes == NEVER or (axes & LON) != 0) and memory.ego_is_rear:
+        return 1
+    if rules.brake_behind_cut_in and axes == LAT and pair.ego_is_rear:
+        if pair.w_other > CUT_IN_SPEED or pair.gap_lat < CUT_IN_GAP:
+            return 2
+    return 0
+
+
+@njit(cache=True)
+def merge(bounds, memory, pair, params, rules, dt):
+    """Tighten the bounds by what is owed to one pair.
+
+    Longitudinal duties are lower bounds of -a_max_brake and upper bounds of -a_min_brake, so they
+    never contradict while a_min_brake <= a_max_brake; lateral ones are limits >= 0 on the two
+    speeds toward the sides.
+    """
+    a_upper = bounds.a_upper
+    left, right, left_next, right_next = bounds.left, bounds.right, bounds.left_next, bounds.right_next
+    if owes_braking(memory, pair, rules) != 0:
+        inherited = memory.axes == NEVER and rules.brake_if_inherited
+        a_upper = min(a_upper, -params.a_max_brake if inherited else -params.a_min_brake)
+    if rules.lateral and owes(memory, LAT):
+        now = lateral_speed_limit(memory.since, memory.w_ego, params, dt)
+        soon = lateral_speed_limit(memory.since + 1, memory.w_ego, params, dt)
+        if memory.side > 0.0:
+            right, right_next = min(right, now), min(right_next, soon)
+        else:
+            left, left_next = min(left, now), min(left_next, soon)
+    return Bounds(bounds.a_lower, a_upper, left, right, left_next, right_next)
