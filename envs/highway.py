@@ -8,12 +8,13 @@ from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 from numba import njit
 
-from shield.blame import DUTIES, VERDICTS, judge_contact, judge_frame
-from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_STEER, Body, Command, shield_frame
+from shield.blame import DUTIES, VERDICTS, Log, judge_contact, judge_frame
+from shield.command import Command
+from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_STEER, Body, shield_frame
 from shield.geometry import PIECE_FIELDS, extents_within, locate, wrap_angle
 from shield.pair import ROAD_USER
 from shield.params import RSSParams, Rules
-from shield.response import LAT, LON, MEMORY
+from shield.response import LAT, LON, MEMORY, forget_safe
 
 _JOIN = 0.5  # lane ends closer than this belong together [m]
 _CHAIN = 8  # lanes followed in either direction
@@ -40,7 +41,27 @@ class Frame(NamedTuple):
     keys: tuple[int, ...]  # `[N]` identity of each user within the episode
     command: Command
     curvature: float  # of the lane at the ego [1/m]
+    jumped: bool  # the lane frame moved everybody at once on this frame
     poses: np.ndarray  # `[N + 1, 4]` x, y, heading, speed in the world, the ego last
+
+
+def log_of(frames: list[Frame]) -> Log:
+    """Recorded frames as the arrays that `shield.blame.audit` reads."""
+    count = 1 + max((max(frame.keys, default=-1) for frame in frames), default=-1)
+    users = np.zeros((len(frames), count), ROAD_USER)
+    present = np.zeros((len(frames), count), bool)
+    for t, frame in enumerate(frames):
+        users[t, list(frame.keys)] = frame.users
+        present[t, list(frame.keys)] = True
+    return Log(
+        ego=np.array([frame.ego for frame in frames], ROAD_USER),
+        users=users,
+        present=present,
+        acceleration=np.array([frame.command.acceleration for frame in frames]),
+        slip=np.array([frame.command.slip for frame in frames]),
+        curvature=np.array([frame.curvature for frame in frames], float),
+        jumped=np.array([frame.jumped for frame in frames], bool),
+    )
 
 
 # ---------------------------------------------------------------- roads
@@ -168,12 +189,13 @@ class ShieldedEgo:
         self.roads: dict = {}
         self.lane_index = None
         self.road = np.zeros((0, PIECE_FIELDS))
+        self.jumped = False
         self.contact: dict | None = None
         self.frames = self.frames_overridden = 0
         self.cost = 0.0
         self.min_ttc = float("inf")
         self.tally = StepTally()
-        self.log: list[Frame] | None = [] if record else None
+        self.record: list[Frame] | None = [] if record else None
         vehicle.act = self.act
 
     # -- called by highway-env
@@ -215,8 +237,8 @@ class ShieldedEgo:
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
         self._count(report, pairs, broken, command.acceleration - wish.acceleration, steering - nominal["steering"])
-        if self.log is not None:
-            self.log.append(Frame(ego.copy(), users.copy(), tuple(self.keys), command, curvature, self.poses.copy()))
+        if self.record is not None:
+            self.record.append(Frame(ego, users, tuple(self.keys), command, curvature, self.jumped, self.poses))
 
     def _count(self, report, pairs: int, broken: int, acceleration_change: float, steering_change: float) -> None:
         tally, overrides = self.tally, self.settings.overrides
@@ -294,6 +316,7 @@ class ShieldedEgo:
 
     def _choose_frame(self) -> None:
         """Measure along the lane the ego is on. Where that moves everybody at once, danger is not their doing."""
+        self.jumped = False
         index = self.vehicle.lane_index
         if index == self.lane_index:
             return
@@ -301,7 +324,9 @@ class ShieldedEgo:
             self.roads[index] = road_through(self.vehicle.road.network, index)
         road = self.roads[index]
         if self.lane_index is not None and not _same_frame(self.road, road):
-            self.memory[self.memory["since"] == 0] = np.zeros(1, MEMORY)
+            self.jumped = True
+            for memory in self.memory:
+                forget_safe(memory)
         self.lane_index, self.road = index, road
 
     def _in_own_lane(self, other) -> bool:
@@ -331,9 +356,7 @@ class ShieldedEgo:
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
         settings = self.settings
         verdicts = [
-            judge_contact(
-                ego, users[i], self.memory[i], settings.ego, settings.other, settings.rules, settings.dt
-            )
+            judge_contact(ego, users[i], self.memory[i], settings.ego, settings.other, settings.rules, settings.dt)
             for i in touching
         ]
         # several at once: the one that weighs most against the ego counts

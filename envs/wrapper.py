@@ -10,7 +10,8 @@ from highway_env.envs.highway_env import HighwayEnv
 from highway_env.envs.merge_env import MergeEnv
 from highway_env.envs.two_way_env import TwoWayEnv
 
-from envs.highway import Settings, ShieldedEgo, StepTally, response_name
+from envs.highway import Frame, Settings, ShieldedEgo, StepTally, log_of, response_name
+from shield.blame import Audit, audit
 from shield.kinematics import frames_for
 from shield.params import PRESETS, Preset, RSSParams, Rules
 
@@ -48,7 +49,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
       params: `Preset`, or a pair of `RSSParams` (ego, other).
       intervention_penalty: subtracted from the reward, times the step's `override_fraction`.
       rules: which duties and margins are in force, for ablations.
-      record: keep every frame of the episode in `frames` for `shield.blame` audits.
+      record: keep every frame of the episode in `frames`, for `audit`.
 
     Raises:
       ValueError: unsupported environment, action type or mode; bad parameters; a response time
@@ -81,9 +82,20 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         self._attach()
 
     @property
-    def frames(self):
-        """Recorded frames of this episode, if `record` was asked for."""
-        return self._ego.log
+    def frames(self) -> list[Frame]:
+        """Recorded frames of this episode so far.
+
+        Raises:
+          ValueError: the wrapper was made without `record=True`.
+        """
+        if self._ego.record is None:
+            raise ValueError("record = False: expected True to keep the frames of an episode")
+        return self._ego.record
+
+    def audit(self) -> Audit:
+        """For every dangerous pair-frame of this episode so far: did the ego keep its duty? Needs `record=True`."""
+        settings = self.settings
+        return audit(log_of(self.frames), settings.ego, settings.other, settings.rules, settings.dt)
 
     @property
     def settings(self) -> Settings:

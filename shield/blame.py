@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shield.command import Command
 from shield.kinematics import speed_envelope
 from shield.lateral import approach_no_credit, lateral_euler_margin
 from shield.pair import assess, sampled_approach, toward
@@ -24,9 +25,11 @@ from shield.response import (
     FRONT,
     LAT,
     LON,
+    MEMORY,
     NEVER,
     WRONG,
     braking_owed,
+    forget_safe,
     lateral_speed_limit,
     longitudinal_response,
     owes,
@@ -77,9 +80,7 @@ def judge_motion(memory, ego, user, ego_params, other_params, dt):
         allowed = lateral_speed_limit(memory.since - 1, memory.w_ego, ego_params, dt)
         if memory.age > 1:
             _blame_ego(memory, TOWARD, memory.side * ego.u - allowed)
-        _blame_other(
-            memory, TOO_CLOSE, memory.approach_other - sampled_approach(memory.w_other, other_params, dt)
-        )
+        _blame_other(memory, TOO_CLOSE, memory.approach_other - sampled_approach(memory.w_other, other_params, dt))
 
 
 @njit(cache=True)
@@ -219,3 +220,58 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
         memory.other_broke,
         memory.other_excess,
     )
+
+
+class Log(NamedTuple):
+    """A recorded episode of T frames with N road users, in shield terms."""
+
+    ego: np.ndarray  # `[T]` `ROAD_USER`
+    users: np.ndarray  # `[T, N]` `ROAD_USER`
+    present: np.ndarray  # `[T, N]` bool; absent users are masked
+    acceleration: np.ndarray  # `[T]` executed by the ego [m/s^2]
+    slip: np.ndarray  # `[T]` [rad]
+    curvature: np.ndarray  # `[T]` of the lane at the ego [1/m]
+    jumped: np.ndarray  # `[T]` bool: the lane frame moved everybody at once on this frame
+
+
+class Audit(NamedTuple):
+    """Was the ego's duty kept? One entry per frame and road user."""
+
+    dangerous: np.ndarray  # `[T, N]` bool: a duty was owed on this frame
+    duty: np.ndarray  # `[T, N]` index into DUTIES, 0 = kept
+    excess: np.ndarray  # `[T, N]` how much it was broken by
+
+
+@njit(cache=True)
+def audit(log, ego_params, other_params, rules, dt):
+    """Replay a log and say for every dangerous pair-frame whether the ego kept its duty (Defs. 4, 8, 10).
+
+    Args:
+      log: `Log`.
+      ego_params, other_params: `RSSParams`, response times in whole frames.
+      rules: `Rules` in force.
+      dt: length of a frame [s].
+
+    Returns:
+      `Audit`.
+    """
+    frames, count = log.present.shape
+    dangerous = np.zeros((frames, count), np.bool_)
+    duty = np.zeros((frames, count), np.int64)
+    excess = np.zeros((frames, count))
+    memory = np.zeros(count, MEMORY)
+    for t in range(frames):
+        ego = log.ego[t]
+        command = Command(log.acceleration[t], log.slip[t])
+        drift = 0.5 * log.curvature[t] * ego.speed**2 * dt
+        for i in range(count):
+            if not log.present[t, i]:
+                continue
+            if log.jumped[t]:
+                forget_safe(memory[i])
+            pair = assess(ego, log.users[t, i], ego_params, other_params, rules, dt)
+            remember(memory[i], pair, ego, log.users[t, i], dt)
+            if memory[i].since > 0:
+                dangerous[t, i] = True
+                duty[t, i], excess[t, i] = audit_command(memory[i], ego, command, drift, ego_params, dt)
+    return Audit(dangerous, duty, excess)

@@ -5,15 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shield.command import Command
 from shield.pair import assess, toward
 from shield.response import LAT, Bounds, merge, owes, owes_braking, remember
-
-
-class Command(NamedTuple):
-    """What the ego does during one frame."""
-
-    acceleration: float  # [m/s^2]
-    slip: float  # angle between heading and motion, positive turns right [rad]
 
 
 class Report(NamedTuple):
@@ -31,6 +25,9 @@ class Report(NamedTuple):
 
 
 RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN = 1, 2, 4
+
+
+_STANDSTILL = 1e-6  # below this speed nothing moves sideways [m/s]
 
 
 class Body(NamedTuple):
@@ -129,13 +126,13 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     the car no faster than its heading already does, so no bound that was kept so far is lost.
     """
     v = ego.speed
-    if v < 0.01 or bounds.left == np.inf:
+    if v < _STANDSTILL or bounds.left == np.inf:
         return slip
-    v_next = max(v + a * dt, 0.01)
+    v_next = max(v + a * dt, _STANDSTILL)
     psi, gain = ego.heading, v * dt / body.half_wheelbase
     turned = body.curvature * v * dt  # the lane turns under the car during the frame ...
     drift = 0.5 * turned * v  # ... and curves away from its tangent [m/s]
-    neutral = _straightening_slip(psi, turned, drift / v, gain)
+    neutral = _straightening_slip(psi, turned, drift, gain, v, bounds)
 
     # lateral speed of this frame: -left <= v sin(psi + slip) - drift <= right
     low = min(_arcsin((-bounds.left + drift) / v) - psi, neutral)
@@ -152,11 +149,20 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
 
 
 @njit(cache=True)
-def _straightening_slip(psi, turned, drift, gain):
-    """Slip that ends the sideways motion: now where that leaves the heading calm, else by the next frame [rad]."""
+def _straightening_slip(psi, turned, drift, gain, v, bounds):
+    """Slip that ends the sideways motion [rad].
+
+    For G <= 1 the lateral speed itself is set to 0 and the heading follows by the factor 1 - G.
+    Beyond, the heading is set straight, and the lateral speed shrinks by 1 - 1/G on the way. While
+    G < 2 the heading still calms down by itself, and the lateral speed keeps its bound first.
+    """
     if gain <= 1.0:
-        return _arcsin(drift) - psi
-    return _arcsin((turned - psi) / gain)
+        return _arcsin(drift / v) - psi
+    slip = _arcsin((turned - psi) / gain)
+    if gain < 2.0:
+        u = v * np.sin(psi + slip) - drift
+        slip = _arcsin((min(max(u, -bounds.left), bounds.right) + drift) / v) - psi
+    return slip
 
 
 @njit(cache=True)

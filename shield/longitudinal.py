@@ -68,9 +68,7 @@ def d_min_opposite_direction(v_correct, v_wrong, correct, wrong):
     Returns:
       Bumper-to-bumper gap [m], at least the larger `standstill_gap`.
     """
-    d_correct = reach(
-        v_correct, correct.response_time, correct.a_max_accel, correct.a_min_brake_correct, correct.v_cap
-    )
+    d_correct = reach(v_correct, correct.response_time, correct.a_max_accel, correct.a_min_brake_correct, correct.v_cap)
     d_wrong = reach(v_wrong, wrong.response_time, wrong.a_max_accel, wrong.a_min_brake, wrong.v_cap)
     return d_correct + d_wrong + np.maximum(correct.standstill_gap, wrong.standstill_gap)
 

@@ -82,6 +82,16 @@ def remember(memory, pair, ego, user, dt):
 
 
 @njit(cache=True)
+def forget_safe(memory):
+    """Drop a memory of safety that a jump of the lane frame made worthless, in place (hole H5).
+
+    If the pair is unsafe now, that is inherited danger: nobody's doing, answered on both axes.
+    """
+    if memory.since == 0:
+        memory.age, memory.axes = 0, NEVER
+
+
+@njit(cache=True)
 def owes(memory, axis):
     """Does this pair owe a response on `axis` now? Danger from the start is answered on both."""
     return memory.since > 0 and (memory.axes == NEVER or (memory.axes & axis) != 0)
@@ -210,9 +220,9 @@ def owes_braking(memory, pair, rules):
     axes = memory.axes if rules.memory else LON
     if rules.longitudinal and (axes == NEVER or (axes & LON) != 0) and memory.ego_is_rear:
         return 1
-    if rules.brake_behind_cut_in and axes == LAT and pair.ego_is_rear:
-        if pair.w_other > CUT_IN_SPEED or pair.gap_lat < CUT_IN_GAP:
-            return 2
+    cuts_in = pair.w_other > CUT_IN_SPEED or pair.gap_lat < CUT_IN_GAP
+    if rules.brake_behind_cut_in and axes == LAT and pair.ego_is_rear and cuts_in:
+        return 2
     return 0
 
 
