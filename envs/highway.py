@@ -141,13 +141,15 @@ def _to_lane_frame(road, poses, before, sizes, wrecks, own_lane, heading_bound, 
         x, y, heading, speed = poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3]
         s, lateral, lane_heading, curvature = locate(road, x, y)
         psi = wrap_angle(heading - lane_heading)
-        if np.isnan(before[i, 0]):
-            u = speed * np.sin(psi)
-        else:
-            u = ((y - before[i, 1]) * np.cos(lane_heading) - (x - before[i, 0]) * np.sin(lane_heading)) / dt
+        cos, sin = np.cos(lane_heading), np.sin(lane_heading)
+        dx, dy = x - before[i, 0], y - before[i, 1]
+        seen = not np.isnan(dx)
+        along = (dx * cos + dy * sin) / dt if seen else speed * np.cos(psi)
+        u = (dy * cos - dx * sin) / dt if seen else speed * np.sin(psi)
         bound = 1.0 if sizes[i, 2] == 0.0 else heading_bound
         half_length, half_width = extents_within(sizes[i, 0], sizes[i, 1], psi, bound)
-        out[i].s, out[i].y, out[i].heading, out[i].speed, out[i].u = s, lateral, psi, speed, u
+        out[i].s, out[i].y, out[i].heading, out[i].speed = s, lateral, psi, speed
+        out[i].along, out[i].u = along, u
         out[i].half_length, out[i].half_width = half_length, half_width
         out[i].wreck, out[i].in_own_lane = wrecks[i], own_lane[i]
     return curvature  # of the lane at the last pose

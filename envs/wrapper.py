@@ -1,6 +1,7 @@
 """ShieldWrapper: the RSS shield around a highway-env environment."""
 
 import math
+from typing import Any
 
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
@@ -124,7 +125,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         return observation, reward, terminated, truncated, info
 
     def _attach(self) -> None:
-        env = self.env.unwrapped
+        env: Any = self.env.unwrapped
         settings = _settings(self.params, self.rules, self.mode, 1 / env.config["simulation_frequency"])
         self._ego = ShieldedEgo(env.vehicle, settings, self.record)
 
@@ -156,7 +157,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         }
 
 
-def _check_environment(env: gym.Env) -> None:
+def _check_environment(env: Any) -> None:
     if not isinstance(env, (HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv)):
         raise ValueError(f"environment {type(env).__name__} is not supported; expected one of {SUPPORTED}")
     if len(env.controlled_vehicles) != 1:

@@ -7,8 +7,9 @@ required distance at t_b is the sum of what each of the two may use up until the
   lateral        how far each may come toward the other
 
 so, as long as both stay inside their own share, they cannot touch. Hence a contact always has a
-culprit: somebody drove faster, braked harder or came closer than the share allows. The ego is held
-to more than its share: its command is checked against Defs. 4 and 8 on every dangerous frame.
+culprit: somebody used more than that share. Displacements are judged, not speeds: heading, slip,
+reversing and turning all end up in them. The ego is held to more: its command is checked against
+Defs. 4 and 8 on every dangerous frame.
 """
 
 from typing import NamedTuple
@@ -17,18 +18,16 @@ import numpy as np
 from numba import njit
 
 from shield.command import Command
-from shield.kinematics import speed_envelope
+from shield.kinematics import forward_reach, speed_envelope, travel
 from shield.lateral import approach_no_credit, lateral_euler_margin
-from shield.pair import assess, sampled_approach, toward
+from shield.longitudinal import euler_margin
+from shield.pair import assess, head_on_braking, is_following, sampled_approach, toward
 from shield.response import (
-    CORRECT,
     FRONT,
     LAT,
     LON,
     MEMORY,
     NEVER,
-    WRONG,
-    braking_owed,
     forget_safe,
     lateral_speed_limit,
     longitudinal_response,
@@ -37,13 +36,14 @@ from shield.response import (
     role_of_ego,
 )
 
-KEPT, TOO_FAST, TOO_WEAK, TOO_HARD, TOO_CLOSE, TOWARD = range(6)
+KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
 DUTIES = (
     "",
-    "drove faster than the proper response allows [m/s]",
-    "braked less than the proper response asks [m/s^2]",
-    "slowed down more than a_max_brake [m/s] or [m/s^2]",
+    "got farther along the lane than its share [m]",
+    "stopped shorter than braking at a_max_brake would [m]",
     "came closer across the lane than its share [m]",
+    "braked less than the proper response asks [m/s^2]",
+    "braked harder than a_max_brake [m/s^2]",
     "moved toward the other across the lane [m/s]",
 )
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
@@ -71,42 +71,66 @@ def _blame_other(memory, duty, excess):
 
 
 @njit(cache=True)
-def judge_motion(memory, ego, user, ego_params, other_params, dt):
-    """Hold the motion of both since the threshold against their shares, on a dangerous sample."""
-    tau = memory.since * dt
+def judge_motion(memory, ego, user, ego_params, other_params, ahead, dt):
+    """Hold what each has used of the distance at the threshold against its share, on a dangerous sample.
+
+    Args:
+      memory: `MEMORY` record after this sample, since > 0; the verdict so far is kept in it.
+      ego, user: `ROAD_USER` records.
+      ego_params, other_params: `RSSParams`.
+      ahead: frames to extrapolate along the headings: 0, or 1 where contact is predicted.
+      dt: length of a frame [s].
+    """
+    step = ahead * dt
     if owes(memory, LON):
-        _judge_speeds(memory, ego, user, tau, ego_params, other_params)
+        travel_ego = memory.travel_ego + ego.speed * np.cos(ego.heading) * step
+        travel_other = memory.travel_other + user.speed * np.cos(user.heading) * step
+        longer_ego = ego.half_length - memory.half_length_ego
+        longer_other = user.half_length - memory.half_length_other
+        tau = (memory.since + ahead) * dt
+        if not is_following(memory.v_ego, memory.v_other, memory.opposite):
+            sign = 1.0 if memory.ego_is_rear else -1.0
+            b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, ego_params, other_params)
+            share = _share_toward(sign * memory.v_ego, ego_params, b_ego, dt)
+            _blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
+            share = _share_toward(-sign * memory.v_other, other_params, b_other, dt)
+            _blame_other(memory, TOO_FAR, -sign * travel_other + longer_other - share)
+        elif memory.ego_is_rear:
+            _blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, ego_params, dt))
+            share = _share_front(tau, memory.v_other, other_params, dt)
+            _blame_other(memory, TOO_SHORT, share - travel_other + longer_other)
+        else:
+            share = _share_front(tau, memory.v_ego, ego_params, dt)
+            _blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
+            share = _share_rear(tau, memory.v_other, other_params, dt)
+            _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
     if owes(memory, LAT):
-        allowed = lateral_speed_limit(memory.since - 1, memory.w_ego, ego_params, dt)
-        if memory.age > 1:
-            _blame_ego(memory, TOWARD, memory.side * ego.u - allowed)
-        _blame_other(memory, TOO_CLOSE, memory.approach_other - sampled_approach(memory.w_other, other_params, dt))
+        used = memory.approach_ego + max(toward(memory.side, ego), 0.0) * step
+        share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
+        _blame_ego(memory, TOO_CLOSE, used - share)
+        used = memory.approach_other + max(toward(-memory.side, user), 0.0) * step
+        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt))
 
 
 @njit(cache=True)
-def _judge_speeds(memory, ego, user, tau, ego_params, other_params):
-    role = role_of_ego(memory)
-    if role == FRONT:
-        slowest = max(memory.v_ego - ego_params.a_max_brake * tau, 0.0)
-        _blame_ego(memory, TOO_HARD, slowest - ego.speed * np.cos(ego.heading))
-        if not memory.opposite:
-            fastest = _fastest(tau, memory.v_other, other_params, other_params.a_min_brake)
-            _blame_other(memory, TOO_FAST, user.speed - fastest)
-        return
-    fastest = _fastest(tau, memory.v_ego, ego_params, braking_owed(role, ego_params))
-    _blame_ego(memory, TOO_FAST, ego.speed - fastest)
-    if memory.opposite:
-        braking = braking_owed(WRONG if role == CORRECT else CORRECT, other_params)
-        fastest = _fastest(tau, -memory.v_other, other_params, braking)
-        _blame_other(memory, TOO_FAST, user.speed - fastest)
-    else:
-        slowest = max(memory.v_other - other_params.a_max_brake * tau, 0.0)
-        _blame_other(memory, TOO_HARD, slowest - user.speed * np.cos(user.heading))
+def _share_rear(tau, v, params, dt):
+    """Farthest a follower may have got `tau` after the threshold, sampled by explicit Euler [m]."""
+    rho, a, b = params.response_time, params.a_max_accel, params.a_min_brake
+    v_now = speed_envelope(tau, v, rho, a, b, params.v_cap)
+    return travel(tau, v, rho, a, b, params.v_cap) + (v - v_now) * dt / 2 + b * dt**2 / 8
 
 
 @njit(cache=True)
-def _fastest(tau, v, params, braking):
-    return speed_envelope(tau, max(v, 0.0), params.response_time, params.a_max_accel, braking)
+def _share_front(tau, v, params, dt):
+    """Least a leader must have got on `tau` after the threshold, sampled by explicit Euler [m]."""
+    v_now = speed_envelope(tau, v, 0.0, 0.0, params.a_max_brake)
+    return travel(tau, v, 0.0, 0.0, params.a_max_brake) + (v - v_now) * dt / 2
+
+
+@njit(cache=True)
+def _share_toward(v, params, b, dt):
+    """Farthest a car with speed `v` toward the other may ever come (Def. 2 and Section 4.1's table) [m]."""
+    return forward_reach(v, params.response_time, params.a_max_accel, b) + euler_margin(v, b, dt)
 
 
 @njit(cache=True)
@@ -157,7 +181,7 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
     pairs = broken = 0
     for i in range(len(users)):
         if memory[i].since > 0:
-            judge_motion(memory[i], ego, users[i], ego_params, other_params, dt)
+            judge_motion(memory[i], ego, users[i], ego_params, other_params, 0, dt)
             duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
             _blame_ego(memory[i], duty, excess)
             pairs += 1
@@ -193,15 +217,8 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     pair = assess(ego, user, ego_params, other_params, rules, dt)
     remember(memory, pair, ego, user, dt)
     if memory.since > 0:
-        judge_motion(memory, ego, user, ego_params, other_params, dt)
-        if owes(memory, LAT):
-            # the simulator extrapolates both along their headings by one frame
-            share = sampled_approach(memory.w_other, other_params, dt)
-            next_step = toward(-memory.side, user) * dt
-            _blame_other(memory, TOO_CLOSE, memory.approach_other + max(next_step, 0.0) - share)
-            share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
-            next_step = toward(memory.side, ego) * dt
-            _blame_ego(memory, TOO_CLOSE, memory.approach_ego + max(next_step, 0.0) - share)
+        judge_motion(memory, ego, user, ego_params, other_params, 0, dt)
+        judge_motion(memory, ego, user, ego_params, other_params, 1, dt)  # highway-env predicts contacts
     ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
     if memory.since == 0:
         verdict = NOBODY

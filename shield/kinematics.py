@@ -48,13 +48,23 @@ def forward_reach(v, rho, a, b):
 
 
 @njit(cache=True)
-def speed_envelope(tau, v, rho, a, b):
+def speed_envelope(tau, v, rho, a, b, v_cap=np.inf):
     """Fastest speed a driver may have `tau` after the danger threshold [m/s].
 
     Accelerate at `a` during `rho`, then brake at `b` to rest (first phase and second phase of the
     proper responses, Defs. 4 and 8), starting from `v` >= 0.
     """
-    return np.maximum(v + a * np.minimum(tau, rho) - b * np.maximum(tau - rho, 0.0), 0.0)
+    v_response = speed_after_response(v, np.minimum(tau, rho), a, v_cap)
+    return np.maximum(v_response - b * np.maximum(tau - rho, 0.0), 0.0)
+
+
+@njit(cache=True)
+def travel(tau, v, rho, a, b, v_cap=np.inf):
+    """Distance covered `tau` after the danger threshold at the speeds of `speed_envelope` [m]."""
+    v_rho = speed_after_response(v, rho, a, v_cap)
+    t_brake = np.minimum(np.maximum(tau - rho, 0.0), v_rho / b)
+    response = response_distance(v, np.minimum(tau, rho), a, v_cap)
+    return response + v_rho * t_brake - 0.5 * b * t_brake**2
 
 
 @njit(cache=True)

@@ -96,14 +96,19 @@ def d_min_longitudinal(v_rear, v_front, facing, rear, front, b_rear, b_front):
 
 
 @njit(cache=True)
-def euler_margin(v_rear, v_front, b, dt):
+def euler_margin(closing, b, dt):
     """What explicit Euler needs on top of a continuous longitudinal distance [m] (condition C5).
 
     The position advances with the speed at the start of the frame, which adds `v dt/2` to each
-    stopping distance; the last partial braking step adds at most `b dt^2/8`. A faster leader would
-    make the margin negative; no credit is taken for it.
+    stopping distance; the last partial braking step adds at most `b dt^2/8`.
+
+    Args:
+      closing: speed toward the other, less the speed at which a leader moves away [m/s]. A faster
+        leader would make the margin negative; no credit is taken for it.
+      b: braking of the car that must stop [m/s^2].
+      dt: length of a frame [s].
     """
-    return np.maximum((v_rear - v_front) * dt / 2, 0.0) + b * dt**2 / 8
+    return np.maximum(closing, 0.0) * dt / 2 + b * dt**2 / 8
 
 
 @njit(cache=True)

@@ -16,7 +16,8 @@ ROAD_USER = np.dtype(
         ("y", "f8"),  # lateral offset of the centre
         ("heading", "f8"),  # relative to the lane
         ("speed", "f8"),  # along its own heading, negative in reverse
-        ("u", "f8"),  # lateral speed over the last frame, slip included
+        ("along", "f8"),  # speed along the lane over the last frame, slip included
+        ("u", "f8"),  # speed across the lane over the last frame
         ("half_length", "f8"),
         ("half_width", "f8"),
         ("in_own_lane", "?"),  # drives in a lane meant for its direction
@@ -124,15 +125,32 @@ def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, ru
     if user.wreck and ego_is_rear:
         v_other = min(v_other, 0.0)
 
-    b_ego = ego_params.a_min_brake_correct if opposite and not user.in_own_lane else ego_params.a_min_brake
-    b_other = other_params.a_min_brake_correct if opposite and user.in_own_lane else other_params.a_min_brake
+    b_ego, b_other = head_on_braking(opposite, user.in_own_lane, ego_params, other_params)
     if ego_is_rear:
         d = d_min_longitudinal(v_ego, v_other, opposite, ego_params, other_params, b_ego, b_other)
-        closing = v_ego - v_other
     else:
         d = d_min_longitudinal(v_other, v_ego, opposite, other_params, ego_params, b_other, b_ego)
-        closing = v_other - v_ego
     if rules.discretisation_margin:
-        b = ego_params.a_min_brake + other_params.a_min_brake
-        d += euler_margin(closing, 0.0, b, dt)
+        direction = 1.0 if ego_is_rear else -1.0
+        if is_following(v_ego, v_other, opposite):
+            b_rear = ego_params.a_min_brake if ego_is_rear else other_params.a_min_brake
+            d += euler_margin(direction * (v_ego - v_other), b_rear, dt)
+        else:
+            d += euler_margin(direction * v_ego, b_ego, dt) + euler_margin(-direction * v_other, b_other, dt)
     return v_ego, v_other, d
+
+
+@njit(cache=True)
+def is_following(v_ego, v_other, opposite):
+    """Do both drive the same way, so that Lemma 2 holds and not the sum of two reaches?"""
+    return not opposite and v_ego >= 0.0 and v_other >= 0.0
+
+
+@njit(cache=True)
+def head_on_braking(opposite, other_in_own_lane, ego_params, other_params):
+    """Braking owed by the ego and by the other where they are not following each other (Def. 2) [m/s^2]."""
+    if not opposite:
+        return ego_params.a_min_brake, other_params.a_min_brake
+    if other_in_own_lane:
+        return ego_params.a_min_brake, other_params.a_min_brake_correct
+    return ego_params.a_min_brake_correct, other_params.a_min_brake

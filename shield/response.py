@@ -27,11 +27,16 @@ MEMORY = np.dtype(
         ("v_other", "f8"),
         ("w_ego", "f8"),
         ("w_other", "f8"),
-        # how far their sides came toward each other across the lane since t_b, and half widths now [m]
+        # motion since t_b: along the lane, and of the sides toward each other across it [m]
+        ("travel_ego", "f8"),
+        ("travel_other", "f8"),
         ("approach_ego", "f8"),
         ("approach_other", "f8"),
-        ("half_ego", "f8"),
-        ("half_other", "f8"),
+        # half lengths at t_b and half widths at the last sample: a car that turns grows [m]
+        ("half_length_ego", "f8"),
+        ("half_length_other", "f8"),
+        ("half_width_ego", "f8"),
+        ("half_width_other", "f8"),
         # first duty that each broke since t_b (`blame.DUTIES`) and the most it was broken by
         ("ego_broke", "i8"),
         ("ego_excess", "f8"),
@@ -71,13 +76,17 @@ def remember(memory, pair, ego, user, dt):
         memory.side = pair.side
         memory.v_ego, memory.v_other = pair.v_ego, pair.v_other
         memory.w_ego, memory.w_other = pair.w_ego, pair.w_other
+        memory.travel_ego = memory.travel_other = 0.0
         memory.approach_ego = memory.approach_other = 0.0
+        memory.half_length_ego, memory.half_length_other = ego.half_length, user.half_length
         memory.ego_broke = memory.other_broke = 0
         memory.ego_excess = memory.other_excess = 0.0
     else:
-        memory.approach_ego += memory.side * ego.u * dt + ego.half_width - memory.half_ego
-        memory.approach_other += -memory.side * user.u * dt + user.half_width - memory.half_other
-    memory.half_ego, memory.half_other = ego.half_width, user.half_width
+        memory.travel_ego += ego.along * dt
+        memory.travel_other += user.along * dt
+        memory.approach_ego += memory.side * ego.u * dt + ego.half_width - memory.half_width_ego
+        memory.approach_other += -memory.side * user.u * dt + user.half_width - memory.half_width_other
+    memory.half_width_ego, memory.half_width_other = ego.half_width, user.half_width
     memory.age += 1
 
 
