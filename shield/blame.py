@@ -21,7 +21,7 @@ from shield.command import Command
 from shield.kinematics import forward_reach, speed_envelope, travel
 from shield.lateral import approach_no_credit, lateral_euler_margin
 from shield.longitudinal import euler_margin
-from shield.pair import assess, head_on_braking, is_following, sampled_approach, toward
+from shield.pair import assess, head_on_braking, is_following, sampled_approach
 from shield.response import (
     FRONT,
     LAT,
@@ -71,7 +71,7 @@ def _blame_other(memory, duty, excess):
 
 
 @njit(cache=True)
-def judge_motion(memory, ego, user, ego_params, other_params, ahead, dt):
+def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
     """Hold what each has used of the distance at the threshold against its share, on a dangerous sample.
 
     Args:
@@ -79,6 +79,8 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, dt):
       ego, user: `ROAD_USER` records.
       ego_params, other_params: `RSSParams`.
       ahead: frames to extrapolate along the headings: 0, or 1 where contact is predicted.
+      slack: how far the ego's heading may overshoot its share in that extrapolation [m]; it lags
+        behind the lateral speed, and `overlap_margin` is there for it.
       dt: length of a frame [s].
     """
     step = ahead * dt
@@ -105,10 +107,10 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, dt):
             share = _share_rear(tau, memory.v_other, other_params, dt)
             _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
     if owes(memory, LAT):
-        used = memory.approach_ego + max(toward(memory.side, ego), 0.0) * step
+        used = memory.approach_ego + max(memory.side * ego.speed * np.sin(ego.heading), 0.0) * step
         share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
-        _blame_ego(memory, TOO_CLOSE, used - share)
-        used = memory.approach_other + max(toward(-memory.side, user), 0.0) * step
+        _blame_ego(memory, TOO_CLOSE, used - share - slack)
+        used = memory.approach_other + max(-memory.side * user.speed * np.sin(user.heading), 0.0) * step
         _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt))
 
 
@@ -181,7 +183,7 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
     pairs = broken = 0
     for i in range(len(users)):
         if memory[i].since > 0:
-            judge_motion(memory[i], ego, users[i], ego_params, other_params, 0, dt)
+            judge_motion(memory[i], ego, users[i], ego_params, other_params, 0, 0.0, dt)
             duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
             _blame_ego(memory[i], duty, excess)
             pairs += 1
@@ -217,8 +219,9 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     pair = assess(ego, user, ego_params, other_params, rules, dt)
     remember(memory, pair, ego, user, dt)
     if memory.since > 0:
-        judge_motion(memory, ego, user, ego_params, other_params, 0, dt)
-        judge_motion(memory, ego, user, ego_params, other_params, 1, dt)  # highway-env predicts contacts
+        judge_motion(memory, ego, user, ego_params, other_params, 0, 0.0, dt)
+        # the simulator predicts contacts one frame ahead
+        judge_motion(memory, ego, user, ego_params, other_params, 1, rules.overlap_margin, dt)
     ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
     if memory.since == 0:
         verdict = NOBODY

@@ -7,7 +7,7 @@ from numba import njit
 
 from shield.command import Command
 from shield.pair import assess, toward
-from shield.response import LAT, Bounds, merge, owes, owes_braking, remember
+from shield.response import Bounds, merge, owes_braking, owes_lateral_stop, remember
 
 
 class Report(NamedTuple):
@@ -43,8 +43,8 @@ def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, ru
     """Restrict the ego's nominal command to what RSS permits on this frame.
 
     Acceleration is clipped after the ego's own controller; an override brakes directly. Steering is
-    chosen so that the lateral speed of this frame, the one that the new heading commits to, and the
-    heading itself stay inside their bounds.
+    chosen so that the lateral speed of this frame, the one that the new heading commits to, course and
+    heading stay inside their bounds.
 
     Args:
       ego: `ROAD_USER` record.
@@ -71,7 +71,7 @@ def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, ru
             dangerous = True
             braking = owes_braking(memory[i], pair, rules)
             response |= RESPONSE_BRAKE if braking == 1 else (RESPONSE_CUT_IN if braking == 2 else 0)
-            response |= RESPONSE_STEER if rules.lateral and owes(memory[i], LAT) else 0
+            response |= RESPONSE_STEER if owes_lateral_stop(memory[i], rules) else 0
         nearest = max(pair.margin_lon, pair.margin_lat)
         if nearest < worst:
             worst, partner, margin_lon, margin_lat = nearest, i, pair.margin_lon, pair.margin_lat
@@ -140,7 +140,9 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     # heading after this frame, by the speed it commits to and by the heading bound
     psi_low, psi_high = _arcsin(-bounds.left_next / v_next), _arcsin(bounds.right_next / v_next)
     if rules.heading_bound < 1.0:
+        # the course, slip included, keeps the bound too: a leader's way along the lane relies on it
         largest = np.arcsin(rules.heading_bound)
+        low, high = max(low, min(-largest - psi, neutral)), min(high, max(largest - psi, neutral))
         psi_low, psi_high = max(psi_low, -largest), min(psi_high, largest)
     low = max(low, min(_arcsin((psi_low - psi + turned) / gain), neutral))
     high = min(high, max(_arcsin((psi_high - psi + turned) / gain), neutral))

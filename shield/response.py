@@ -223,16 +223,21 @@ CUT_IN_GAP = 0.3  # ... or is nearer than this across the lane [m]
 
 @njit(cache=True)
 def owes_braking(memory, pair, rules):
-    """Must the ego brake for this pair? Returns the reason: 0 none, 1 Def. 4, 2 behind a cut-in (H6)."""
+    """Must the ego brake for this pair? Returns the reason: 0 none, 1 Def. 4, 2 behind a cut-in (hole H6)."""
     if memory.since == 0:
         return 0
-    axes = memory.axes if rules.memory else LON
-    if rules.longitudinal and (axes == NEVER or (axes & LON) != 0) and memory.ego_is_rear:
+    if rules.longitudinal and (owes(memory, LON) or not rules.memory) and memory.ego_is_rear:
         return 1
     cuts_in = pair.w_other > CUT_IN_SPEED or pair.gap_lat < CUT_IN_GAP
-    if rules.brake_behind_cut_in and axes == LAT and pair.ego_is_rear and cuts_in:
+    if rules.brake_behind_cut_in and memory.axes == LAT and pair.ego_is_rear and cuts_in:
         return 2
     return 0
+
+
+@njit(cache=True)
+def owes_lateral_stop(memory, rules):
+    """Must the ego stop moving toward this neighbour (Def. 8)?"""
+    return rules.lateral and rules.memory and owes(memory, LAT)
 
 
 @njit(cache=True)
@@ -248,7 +253,7 @@ def merge(bounds, memory, pair, params, rules, dt):
     if owes_braking(memory, pair, rules) != 0:
         inherited = memory.axes == NEVER and rules.brake_if_inherited
         a_upper = min(a_upper, -params.a_max_brake if inherited else -params.a_min_brake)
-    if rules.lateral and owes(memory, LAT):
+    if owes_lateral_stop(memory, rules):
         now = lateral_speed_limit(memory.since, memory.w_ego, params, dt)
         soon = lateral_speed_limit(memory.since + 1, memory.w_ego, params, dt)
         if memory.side > 0.0:
