@@ -194,6 +194,7 @@ class ShieldedEgo:
         self.jumped = False
         self.contact: dict | None = None
         self.frames = self.frames_overridden = 0
+        self.dangerous_pairs = self.broken_duties = 0
         self.cost = 0.0
         self.min_ttc = float("inf")
         self.tally = StepTally()
@@ -257,6 +258,8 @@ class ShieldedEgo:
         tally.response |= report.response
         self.frames += 1
         self.frames_overridden += report.overridden and overrides
+        self.dangerous_pairs += pairs
+        self.broken_duties += broken
         self.min_ttc = min(self.min_ttc, report.ttc)
 
     def _index_on_road(self, i: int) -> int:

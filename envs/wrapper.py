@@ -41,7 +41,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
       blame: "" before a contact, then "ego", "other", "both", "inherited", or "none" (a bug).
       blame_evidence: {} or partner, kind of danger, seconds since its threshold, duties broken and
         by how much.
-      override_share, episode_cost, min_ttc: since reset; min_ttc [s] is at most 100.
+      override_share, episode_cost, episode_dangerous_pairs, episode_broken_duties, min_ttc: since
+        reset; min_ttc [s] is at most 100.
       raw_reward: the environment's own reward (after a step).
 
     Args:
@@ -153,6 +154,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
             "blame_evidence": dict(ego.contact) if ego.contact else {},
             "override_share": ego.frames_overridden / max(ego.frames, 1),
             "episode_cost": ego.cost,
+            "episode_dangerous_pairs": ego.dangerous_pairs,
+            "episode_broken_duties": ego.broken_duties,
             "min_ttc": min(ego.min_ttc, LONGEST_TTC),
         }
 

@@ -114,13 +114,12 @@ def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, ru
     # A follower may turn back into the lane at any time: its whole speed counts. A leader may turn
     # within the heading bound while it brakes, and a wreck may stop on the spot.
     shortest = np.sqrt(1.0 - rules.heading_bound**2) if rules.heading_bound < 1.0 else 1.0
+    v_ego = ego.speed if ego_is_rear else ego.speed * min(np.cos(ego.heading), shortest)
     if opposite:
-        v_ego, v_other = ego.speed, -user.speed
+        v_other = -user.speed
     elif ego_is_rear:
-        v_ego = ego.speed
         v_other = user.speed * min(np.cos(user.heading), shortest)
     else:
-        v_ego = ego.speed * min(np.cos(ego.heading), shortest)
         v_other = user.speed
     if user.wreck and ego_is_rear:
         v_other = min(v_other, 0.0)

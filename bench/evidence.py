@@ -1,0 +1,191 @@
+"""The claim, tested on the original simulator: whatever the policy, the ego is never to blame.
+
+    python bench/evidence.py                     every case, results in runs/evidence/
+    python bench/evidence.py --cases fast-random fast-faster --episodes 50
+    python bench/evidence.py --modes monitor     the same policies without the shield
+
+Each case plays scripted policies on seeds 0, 1, ... and prints one row: contacts by verdict, the
+upper end of the 95 % interval for "ego at fault", the audit of every dangerous pair-frame, return
+and speed. A case whose file is there already is not played again.
+"""
+
+import dataclasses
+import multiprocessing
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from envs import make
+from envs.traffic import RECKLESS
+from eval.files import atomic
+from eval.progress import progress_bar
+from eval.rollout import run_episode
+from eval.stats import bootstrap_mean, wilson
+
+LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)
+CONTINUOUS = {"action": {"type": "ContinuousAction"}}
+
+
+class Case(NamedTuple):
+    """One scripted policy in one environment."""
+
+    env_id: str
+    policy: str
+    episodes: int
+    config: dict[str, Any]
+
+
+def act(policy: str, rng: np.random.Generator) -> Any:
+    """The next action of a scripted policy."""
+    match policy:
+        case "random":
+            return int(rng.integers(5))
+        case "faster":
+            return FASTER
+        case "idle":
+            return IDLE
+        case "slower":
+            return SLOWER
+        case "lanes":
+            return LANE_LEFT if rng.random() < 0.5 else LANE_RIGHT
+        case "continuous":
+            return rng.uniform(-1.0, 1.0, 2)
+        case "full-throttle":
+            return np.array([1.0, rng.uniform(-1.0, 1.0)])
+    raise ValueError(f"policy = {policy!r} is unknown")
+
+
+def _cases() -> dict[str, Case]:
+    cases = {}
+    for name, env_id, episodes in (
+        ("fast", "highway-fast-v0", 300),
+        ("highway", "highway-v0", 100),
+        ("merge", "merge-v0", 100),
+        ("two-way", "two-way-v0", 100),
+        ("exit", "exit-v0", 100),
+    ):
+        for policy in ("random", "faster", "idle"):
+            cases[f"{name}-{policy}"] = Case(env_id, policy, episodes, {})
+    cases["fast-slower"] = Case("highway-fast-v0", "slower", 100, {})
+    cases["fast-lanes"] = Case("highway-fast-v0", "lanes", 100, {})
+    cases["fast-continuous"] = Case("highway-fast-v0", "continuous", 300, CONTINUOUS)
+    cases["fast-full-throttle"] = Case("highway-fast-v0", "full-throttle", 100, CONTINUOUS)
+    reckless = {"other_vehicles_type": RECKLESS}
+    cases["reckless-random"] = Case("highway-fast-v0", "random", 200, reckless)
+    cases["reckless-full-throttle"] = Case("highway-fast-v0", "full-throttle", 200, reckless | CONTINUOUS)
+    return cases
+
+
+CASES = _cases()
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """Play scripted policies under the shield and count who is to blame."""
+
+    cases: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = tuple(CASES)  # which cases to play
+    episodes: int = 0  # episodes per case; 0: as many as the case asks for
+    modes: tuple[str, ...] = ("override",)  # "override" and/or "monitor"
+    n_workers: int = 2  # processes
+    out: Path = Path("runs/evidence")  # one CSV per case and mode
+
+
+def play(name: str, mode: str, seed: int) -> dict[str, Any]:
+    """One episode of one case."""
+    case = CASES[name]
+    rng = np.random.default_rng(seed)
+    record = run_episode(
+        lambda: make(case.env_id, shield=mode, config=dict(case.config)), lambda _: act(case.policy, rng), seed
+    )
+    return {"case": name, "mode": mode, **record}
+
+
+def played(name: str, mode: str, config: Config) -> pd.DataFrame:
+    """All episodes of one case, from its file if that is there already."""
+    count = config.episodes or CASES[name].episodes
+    path = config.out / f"{name}-{mode}.csv"
+    if path.exists():
+        frame = pd.read_csv(path, keep_default_na=False)
+        if len(frame) == count:
+            return frame
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(config.n_workers, context) as pool, progress_bar(count, name, "episode") as bar:
+        rows = []
+        for row in pool.map(play, [name] * count, [mode] * count, range(count)):
+            rows.append(row)
+            bar.update()
+    frame = pd.DataFrame(rows)
+    with atomic(path) as temporary:
+        frame.to_csv(temporary, index=False)
+    return frame
+
+
+def row(frame: pd.DataFrame) -> list[str]:
+    """One line of the table."""
+    n = len(frame)
+    count = {
+        verdict: int((frame["blame"] == verdict).sum()) for verdict in ("ego", "both", "other", "inherited", "none")
+    }
+    at_fault = count["ego"] + count["both"]
+    returns = bootstrap_mean(frame["return"], np.random.default_rng(0))
+    return [
+        str(frame["case"].iloc[0]),
+        str(frame["mode"].iloc[0]),
+        str(n),
+        str(int(frame["crashed"].sum())),
+        f"{at_fault} (< {100 * wilson(at_fault, n).high:.1f} %)",
+        str(count["other"]),
+        str(count["inherited"]),
+        str(count["none"]),
+        f"{frame['broken_duties'].sum()} / {frame['dangerous_pairs'].sum()}",
+        f"{returns.value:.2f} [{returns.low:.2f}, {returns.high:.2f}]",
+        f"{frame['speed'].mean():.1f}",
+        f"{100 * frame['override_share'].mean():.0f} %",
+    ]
+
+
+COLUMNS = (
+    "case",
+    "mode",
+    "n",
+    "contacts",
+    "ego at fault",
+    "other",
+    "inherited",
+    "none",
+    "duties broken / pair-frames",
+    "return",
+    "speed",
+    "overridden",
+)
+
+
+def main(config: Config) -> int:
+    unknown = [name for name in config.cases if name not in CASES]
+    if unknown:
+        print(f"cases = {unknown[0]!r}: expected some of {', '.join(CASES)}", file=sys.stderr)
+        return 2
+    config.out.mkdir(parents=True, exist_ok=True)
+    table = Table(*COLUMNS)
+    bad = 0
+    for mode in config.modes:
+        for name in config.cases:
+            frame = played(name, mode, config)
+            table.add_row(*row(frame))
+            bad += int((frame["blame"] == "none").sum())
+            if mode == "override":
+                bad += int(frame["blame"].isin(["ego", "both"]).sum() + (frame["broken_duties"] > 0).sum())
+    Console(width=170).print(table)
+    print("at fault: upper end of the 95 % Wilson interval; return: mean with 95 % bootstrap interval")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(tyro.cli(Config, description=__doc__)))
