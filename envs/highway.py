@@ -6,10 +6,10 @@ import numpy as np
 from highway_env.road.lane import CircularLane, SineLane, StraightLane
 from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
-from numba import njit
 
 from shield.blame import DUTIES, VERDICTS, Log, judge_contact, judge_frame
 from shield.command import Command
+from shield.compiled import compiled
 from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_STEER, Body, shield_frame
 from shield.geometry import PIECE_FIELDS, extents_within, locate, wrap_angle
 from shield.pair import ROAD_USER
@@ -133,7 +133,7 @@ def _same_frame(road: np.ndarray, other: np.ndarray) -> bool:
     return straight and bool(np.ptp(np.concatenate([road[:, 2], other[:, 2]])) < 1e-9)
 
 
-@njit(cache=True)
+@compiled
 def _to_lane_frame(road, poses, before, sizes, wrecks, own_lane, heading_bound, dt, out):
     """Fill `out` `[N]` `ROAD_USER` from world poses `[N, 4]`; `before` `[N, 2]` is nan at first sight."""
     curvature = 0.0

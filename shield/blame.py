@@ -15,9 +15,9 @@ Defs. 4 and 8 on every dangerous frame.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from shield.command import Command
+from shield.compiled import compiled
 from shield.kinematics import forward_reach, speed_envelope, travel
 from shield.lateral import approach_no_credit, lateral_euler_margin
 from shield.longitudinal import euler_margin
@@ -52,7 +52,7 @@ VERDICTS = ("none", "ego", "other", "both", "inherited")
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
 
 
-@njit(cache=True)
+@compiled
 def _blame_ego(memory, duty, excess):
     if excess > _TOLERANCE:
         if memory.ego_broke == KEPT:
@@ -61,7 +61,7 @@ def _blame_ego(memory, duty, excess):
             memory.ego_excess = max(memory.ego_excess, excess)
 
 
-@njit(cache=True)
+@compiled
 def _blame_other(memory, duty, excess):
     if excess > _TOLERANCE:
         if memory.other_broke == KEPT:
@@ -70,7 +70,7 @@ def _blame_other(memory, duty, excess):
             memory.other_excess = max(memory.other_excess, excess)
 
 
-@njit(cache=True)
+@compiled
 def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
     """Hold what each has used of the distance at the threshold against its share, on a dangerous sample.
 
@@ -89,7 +89,8 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
         travel_other = memory.travel_other + user.speed * np.cos(user.heading) * step
         longer_ego = ego.half_length - memory.half_length_ego
         longer_other = user.half_length - memory.half_length_other
-        tau = (memory.since + ahead) * dt
+        # danger from the start is counted from its first sample, any other from the safe one before
+        tau = (memory.since - (memory.axes == NEVER) + ahead) * dt
         if not is_following(memory.v_ego, memory.v_other, memory.opposite):
             sign = 1.0 if memory.ego_is_rear else -1.0
             b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, ego_params, other_params)
@@ -114,7 +115,7 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
         _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt))
 
 
-@njit(cache=True)
+@compiled
 def _share_rear(tau, v, params, dt):
     """Farthest a follower may have got `tau` after the threshold, sampled by explicit Euler [m]."""
     rho, a, b = params.response_time, params.a_max_accel, params.a_min_brake
@@ -122,20 +123,20 @@ def _share_rear(tau, v, params, dt):
     return travel(tau, v, rho, a, b, params.v_cap) + (v - v_now) * dt / 2 + b * dt**2 / 8
 
 
-@njit(cache=True)
+@compiled
 def _share_front(tau, v, params, dt):
     """Least a leader must have got on `tau` after the threshold, sampled by explicit Euler [m]."""
     v_now = speed_envelope(tau, v, 0.0, 0.0, params.a_max_brake)
     return travel(tau, v, 0.0, 0.0, params.a_max_brake) + (v - v_now) * dt / 2
 
 
-@njit(cache=True)
+@compiled
 def _share_toward(v, params, b, dt):
     """Farthest a car with speed `v` toward the other may ever come (Def. 2 and Section 4.1's table) [m]."""
     return forward_reach(v, params.response_time, params.a_max_accel, b) + euler_margin(v, b, dt)
 
 
-@njit(cache=True)
+@compiled
 def audit_command(memory, ego, command, drift, params, dt):
     """Did the ego's command keep its duty toward one road user on one dangerous frame?
 
@@ -167,7 +168,7 @@ def audit_command(memory, ego, command, drift, params, dt):
     return KEPT, 0.0
 
 
-@njit(cache=True)
+@compiled
 def judge_frame(ego, users, memory, command, curvature, ego_params, other_params, dt):
     """Judge one frame of all pairs after `shield_frame` has updated their memory.
 
@@ -203,7 +204,7 @@ class Verdict(NamedTuple):
     other_excess: float
 
 
-@njit(cache=True)
+@compiled
 def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     """Verdict at the first contact of the ego with one road user (Def. 27).
 
@@ -262,7 +263,7 @@ class Audit(NamedTuple):
     excess: np.ndarray  # `[T, N]` how much it was broken by
 
 
-@njit(cache=True)
+@compiled
 def audit(log, ego_params, other_params, rules, dt):
     """Replay a log and say for every dangerous pair-frame whether the ego kept its duty (Defs. 4, 8, 10).
 

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from shield.command import Command
+from shield.compiled import compiled
 from shield.pair import assess, toward
 from shield.response import Bounds, merge, owes_braking, owes_lateral_stop, remember
 
@@ -38,7 +38,7 @@ class Body(NamedTuple):
     curvature: float  # of the lane at the ego, positive turns right [1/m]
 
 
-@njit(cache=True)
+@compiled
 def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, rules, dt):
     """Restrict the ego's nominal command to what RSS permits on this frame.
 
@@ -94,7 +94,7 @@ def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, ru
     )
 
 
-@njit(cache=True)
+@compiled
 def always_on(ego, params, rules, dt):
     """Limits that hold even where nobody is in danger (conditions C1, C1y of the sampled proof)."""
     if not rules.limits:
@@ -105,7 +105,7 @@ def always_on(ego, params, rules, dt):
     return Bounds(-params.a_max_brake, min(params.a_max_accel, cap), left, right, left, right)
 
 
-@njit(cache=True)
+@compiled
 def restrict(nominal, bounds, ego, body, rules, dt):
     """The command nearest to the nominal one inside the bounds."""
     a = min(max(nominal.acceleration, bounds.a_lower), bounds.a_upper)
@@ -114,7 +114,7 @@ def restrict(nominal, bounds, ego, body, rules, dt):
     return Command(a, _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt))
 
 
-@njit(cache=True)
+@compiled
 def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     """Slip angle nearest to the nominal one inside the lateral bounds [rad].
 
@@ -150,7 +150,7 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     return min(max(slip, low), high)
 
 
-@njit(cache=True)
+@compiled
 def _straightening_slip(psi, turned, drift, gain, v, bounds):
     """Slip that ends the sideways motion [rad].
 
@@ -167,6 +167,6 @@ def _straightening_slip(psi, turned, drift, gain, v, bounds):
     return slip
 
 
-@njit(cache=True)
+@compiled
 def _arcsin(x):
     return np.arcsin(min(max(x, -1.0), 1.0))

@@ -6,20 +6,21 @@ half width of the lane. y points to the right of the driving direction.
 """
 
 import numpy as np
-from numba import njit
+
+from shield.compiled import compiled
 
 PIECE_FIELDS = 7
 X, Y, HEADING, CURVATURE, LENGTH, ARC_START, HALF_WIDTH = range(PIECE_FIELDS)
 _STRAIGHT = 1e-9  # curvature below which a piece is straight [1/m]
 
 
-@njit(cache=True)
+@compiled
 def wrap_angle(angle):
     """The same angle in [-pi, pi) [rad]."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-@njit(cache=True)
+@compiled
 def _on_piece(piece, x, y):
     """Arc length from the start of a piece, signed lateral offset [m] and heading of the lane there [rad]."""
     dx, dy = x - piece[X], y - piece[Y]
@@ -34,7 +35,7 @@ def _on_piece(piece, x, y):
     return angle / kappa, (1.0 / abs(kappa) - radius) * np.sign(kappa), piece[HEADING] + angle
 
 
-@njit(cache=True)
+@compiled
 def locate(road, x, y):
     """Lane coordinates of a point.
 
@@ -68,7 +69,7 @@ def locate(road, x, y):
     return s_best, y_best, heading_best, kappa_best
 
 
-@njit(cache=True)
+@compiled
 def _on_tangent(piece, x, y, at_end):
     """Coordinates on the straight continuation of a curved piece."""
     length = piece[LENGTH] if at_end else 0.0
@@ -81,7 +82,7 @@ def _on_tangent(piece, x, y, at_end):
     return length + dx * cos + dy * sin, -dx * sin + dy * cos, end_heading
 
 
-@njit(cache=True)
+@compiled
 def half_extents(length, width, heading):
     """Half extents (along, across) of an oriented box in a lane frame [m].
 
@@ -93,7 +94,7 @@ def half_extents(length, width, heading):
     return 0.5 * (length * cos + width * sin), 0.5 * (length * sin + width * cos)
 
 
-@njit(cache=True)
+@compiled
 def extents_within(length, width, heading, heading_bound):
     """Half extents [m] that hold for every angle to the lane within the bound, and for `heading` beyond it.
 
@@ -107,7 +108,7 @@ def extents_within(length, width, heading, heading_bound):
     return np.maximum(along, along_bound), np.maximum(across, across_bound)
 
 
-@njit(cache=True)
+@compiled
 def signed_gap(distance, half_1, half_2):
     """Bumper-to-bumper gap along one axis [m]; negative where the boxes overlap on it."""
     return np.abs(distance) - half_1 - half_2

@@ -4,16 +4,17 @@ All functions take floats or arrays that broadcast, in SI units, and are compile
 """
 
 import numpy as np
-from numba import njit
+
+from shield.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def speed_after_response(v, rho, a, v_cap):
     """Speed after accelerating at `a` for `rho`, never beyond `v_cap` [m/s]. A faster car keeps its speed."""
     return np.minimum(v + a * rho, np.maximum(v_cap, v))
 
 
-@njit(cache=True)
+@compiled
 def response_distance(v, rho, a, v_cap):
     """Distance covered while accelerating at `a` for `rho`, speed limited to `v_cap` [m], for v >= 0."""
     v_rho = speed_after_response(v, rho, a, v_cap)
@@ -21,20 +22,20 @@ def response_distance(v, rho, a, v_cap):
     return 0.5 * (v + v_rho) * ramp + v_rho * (rho - ramp)
 
 
-@njit(cache=True)
+@compiled
 def stopping_distance(v, b):
     """Distance to rest from speed `v` >= 0 with braking `b` > 0 [m]."""
     return v**2 / (2 * b)
 
 
-@njit(cache=True)
+@compiled
 def reach(v, rho, a, b, v_cap):
     """Distance covered by "accelerate at `a` for `rho`, then brake at `b` to rest" from v >= 0 [m]."""
     v_rho = speed_after_response(v, rho, a, v_cap)
     return response_distance(v, rho, a, v_cap) + stopping_distance(v_rho, b)
 
 
-@njit(cache=True)
+@compiled
 def forward_reach(v, rho, a, b):
     """Largest displacement ever reached in the positive direction, for any sign of `v` [m].
 
@@ -47,7 +48,7 @@ def forward_reach(v, rho, a, b):
     return np.maximum(end, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def speed_envelope(tau, v, rho, a, b, v_cap=np.inf):
     """Fastest speed a driver may have `tau` after the danger threshold [m/s].
 
@@ -58,7 +59,7 @@ def speed_envelope(tau, v, rho, a, b, v_cap=np.inf):
     return np.maximum(v_response - b * np.maximum(tau - rho, 0.0), 0.0)
 
 
-@njit(cache=True)
+@compiled
 def travel(tau, v, rho, a, b, v_cap=np.inf):
     """Distance covered `tau` after the danger threshold at the speeds of `speed_envelope` [m]."""
     v_rho = speed_after_response(v, rho, a, v_cap)
@@ -67,7 +68,7 @@ def travel(tau, v, rho, a, b, v_cap=np.inf):
     return response + v_rho * t_brake - 0.5 * b * t_brake**2
 
 
-@njit(cache=True)
+@compiled
 def frames_for(duration, dt):
     """A duration rounded up to whole frames of length `dt`, in frames (condition C2)."""
     return np.ceil(duration / dt - 1e-9)

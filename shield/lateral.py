@@ -1,12 +1,12 @@
 """Lateral safety: Defs. 5-8, Lemma 4. Lateral speeds are positive to the right."""
 
 import numpy as np
-from numba import njit
 
+from shield.compiled import compiled
 from shield.kinematics import forward_reach
 
 
-@njit(cache=True)
+@compiled
 def d_min_lateral(u_left, u_right, left, right, mode="no_credit"):
     """Smallest safe lateral gap between two cars side by side (Def. 6, Lemma 4) [m].
 
@@ -46,25 +46,25 @@ def d_min_lateral(u_left, u_right, left, right, mode="no_credit"):
         raise ValueError("mode of d_min_lateral: expected 'no_credit', 'pair', 'sup' or 'paper'")
 
 
-@njit(cache=True)
+@compiled
 def approach_no_credit(w, car):
     """Farthest a car with speed `w` toward its neighbour can still come, receding not credited [m]."""
     return forward_reach(np.maximum(w, 0.0), car.response_time, car.a_lat_max_accel, car.a_lat_min_brake)
 
 
-@njit(cache=True)
+@compiled
 def _approach_at_rest(w, car):
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
     return w * rho + 0.5 * a * rho**2 + np.maximum(w + a * rho, 0.0) ** 2 / (2 * b)
 
 
-@njit(cache=True)
+@compiled
 def _approach_as_printed(w, car):
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
     return w * rho + 0.5 * a * rho**2 + (w + a * rho) ** 2 / (2 * b)
 
 
-@njit(cache=True)
+@compiled
 def _approach_at(t, w, car):
     """Displacement toward the neighbour after `t` of "accelerate, then brake"; a receding car halts at rho."""
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
@@ -74,7 +74,7 @@ def _approach_at(t, w, car):
     return w * t_response + 0.5 * a * t_response**2 + v * t_brake - 0.5 * b * t_brake**2
 
 
-@njit(cache=True)
+@compiled
 def _phase(t, w, car):
     """Speed and acceleration toward the neighbour just after `t`."""
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
@@ -85,7 +85,7 @@ def _phase(t, w, car):
     return speed, acceleration
 
 
-@njit(cache=True)
+@compiled
 def _largest_approach(w_left, w_right, left, right):
     """Supremum over time of the sum of both approaches, never below 0 [m].
 
@@ -106,7 +106,7 @@ def _largest_approach(w_left, w_right, left, right):
     return largest
 
 
-@njit(cache=True)
+@compiled
 def lateral_euler_margin(w, car, dt):
     """What frames of length `dt` need on top of one car's continuous lateral approach [m] (condition C5).
 
@@ -119,7 +119,7 @@ def lateral_euler_margin(w, car, dt):
     return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8 + frame_start
 
 
-@njit(cache=True)
+@compiled
 def mu_lateral_velocity(time, path, k, mu):
     """mu-lateral velocity at sample `k` of a recorded lateral path (Def. 5) [m/s]. Offline: it looks ahead.
 

@@ -1,12 +1,12 @@
 """Longitudinal safety: Defs. 1-4, Lemmas 2 and 3."""
 
 import numpy as np
-from numba import njit
 
+from shield.compiled import compiled
 from shield.kinematics import forward_reach, reach, response_distance, speed_after_response, stopping_distance
 
 
-@njit(cache=True)
+@compiled
 def d_min_same_direction(v_rear, v_front, rear, front, mode="exact"):
     """Smallest safe gap to a car ahead driving the same way (Def. 1, Lemma 2) [m].
 
@@ -39,7 +39,7 @@ def d_min_same_direction(v_rear, v_front, rear, front, mode="exact"):
     return d + rear.standstill_gap
 
 
-@njit(cache=True)
+@compiled
 def _closest_while_braking(v_rear, v_front, rear, front):
     """Room needed at the moment both have the same speed; -inf where they never have while rolling (hole H1)."""
     rho = rear.response_time
@@ -54,7 +54,7 @@ def _closest_while_braking(v_rear, v_front, rear, front):
     return np.where(both_roll, needed, -np.inf)
 
 
-@njit(cache=True)
+@compiled
 def d_min_opposite_direction(v_correct, v_wrong, correct, wrong):
     """Smallest safe gap between two cars driving toward each other (Def. 2, Lemma 3) [m].
 
@@ -73,7 +73,7 @@ def d_min_opposite_direction(v_correct, v_wrong, correct, wrong):
     return d_correct + d_wrong + np.maximum(correct.standstill_gap, wrong.standstill_gap)
 
 
-@njit(cache=True)
+@compiled
 def d_min_longitudinal(v_rear, v_front, facing, rear, front, b_rear, b_front):
     """Smallest safe gap for any signs of speed (floats only) [m].
 
@@ -95,7 +95,7 @@ def d_min_longitudinal(v_rear, v_front, facing, rear, front, b_rear, b_front):
     return d_rear + d_front + np.maximum(rear.standstill_gap, front.standstill_gap)
 
 
-@njit(cache=True)
+@compiled
 def euler_margin(closing, b, dt):
     """What explicit Euler needs on top of a continuous longitudinal distance [m] (condition C5).
 
@@ -111,7 +111,7 @@ def euler_margin(closing, b, dt):
     return np.maximum(closing, 0.0) * dt / 2 + b * dt**2 / 8
 
 
-@njit(cache=True)
+@compiled
 def is_safe_longitudinally(gap, d_min):
     """Def. 1/2 as a predicate on signed bumper-to-bumper gaps: overlapping cars are never safe (hole H4)."""
     return (gap > 0.0) & (gap >= d_min)

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from shield.compiled import compiled
 from shield.geometry import signed_gap
 from shield.lateral import approach_no_credit, d_min_lateral, lateral_euler_margin
 from shield.longitudinal import d_min_longitudinal, euler_margin, is_safe_longitudinally
@@ -27,6 +27,9 @@ ROAD_USER = np.dtype(
 )
 
 
+_STANDSTILL = 1e-6  # slower than this is standing [m/s]
+
+
 class Pair(NamedTuple):
     """What Defs. 1-9 say about the ego and one other road user now."""
 
@@ -45,7 +48,7 @@ class Pair(NamedTuple):
     w_other: float
 
 
-@njit(cache=True)
+@compiled
 def toward(side, user):
     """Lateral speed toward `side`: the larger of the last frame's and the one the heading commits to [m/s].
 
@@ -54,7 +57,7 @@ def toward(side, user):
     return max(side * user.u, side * user.speed * np.sin(user.heading))
 
 
-@njit(cache=True)
+@compiled
 def assess(ego, user, ego_params, other_params, rules, dt):
     """Evaluate both axes of one pair on one frame.
 
@@ -101,26 +104,27 @@ def assess(ego, user, ego_params, other_params, rules, dt):
     )
 
 
-@njit(cache=True)
+@compiled
 def sampled_approach(w, car, dt):
     """Farthest a compliant car may come, sampled every `dt`, from speed `w` toward its neighbour [m]."""
     w = max(w, 0.0)
     return approach_no_credit(w, car) + w * dt / 2 + car.a_lat_min_brake * dt**2 / 8
 
 
-@njit(cache=True)
+@compiled
 def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt):
     """Speeds along the lane as Def. 1 or 2 must assume them, and the required gap."""
     # A follower may turn back into the lane at any time: its whole speed counts. A leader may turn
     # within the heading bound while it brakes, and a wreck may stop on the spot.
     shortest = np.sqrt(1.0 - rules.heading_bound**2) if rules.heading_bound < 1.0 else 1.0
-    v_ego = ego.speed if ego_is_rear else ego.speed * min(np.cos(ego.heading), shortest)
+    v_ego = _fastest(ego) if ego_is_rear else ego.speed * min(np.cos(ego.heading), shortest)
     if opposite:
         v_other = -user.speed
     elif ego_is_rear:
         v_other = user.speed * min(np.cos(user.heading), shortest)
     else:
-        v_other = user.speed
+        v_other = _fastest(user)
+    v_ego, v_other = _settled(v_ego), _settled(v_other)
     if user.wreck and ego_is_rear:
         v_other = min(v_other, 0.0)
 
@@ -139,13 +143,25 @@ def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, ru
     return v_ego, v_other, d
 
 
-@njit(cache=True)
+@compiled
+def _fastest(user):
+    """Speed along the lane that a follower must be expected to have [m/s]: one turned round may reverse forward."""
+    return max(user.speed, user.speed * np.cos(user.heading))
+
+
+@compiled
+def _settled(v):
+    """A speed without the rounding error that a car which has just stopped is left with [m/s]."""
+    return 0.0 if abs(v) < _STANDSTILL else v
+
+
+@compiled
 def is_following(v_ego, v_other, opposite):
     """Do both drive the same way, so that Lemma 2 holds and not the sum of two reaches?"""
     return not opposite and v_ego >= 0.0 and v_other >= 0.0
 
 
-@njit(cache=True)
+@compiled
 def head_on_braking(opposite, other_in_own_lane, ego_params, other_params):
     """Braking owed by the ego and by the other where they are not following each other (Def. 2) [m/s^2]."""
     if not opposite:

@@ -7,8 +7,8 @@ road user, make up the memory of a scene. A new record is all zeros.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from shield.compiled import compiled
 from shield.kinematics import speed_envelope
 
 NEVER, LON, LAT = 0, 1, 2  # axes that were safe at the last safe sample; LON | LAT is both
@@ -47,7 +47,7 @@ MEMORY = np.dtype(
 )
 
 
-@njit(cache=True)
+@compiled
 def step_threshold(axes, since, safe_lon, safe_lat):
     """Danger threshold of one pair, one sample on (Defs. 3, 7, 9, 10).
 
@@ -66,7 +66,7 @@ def step_threshold(axes, since, safe_lon, safe_lat):
     return axes, since + 1
 
 
-@njit(cache=True)
+@compiled
 def remember(memory, pair, ego, user, dt):
     """Carry one pair's memory over to this sample, in place."""
     memory.axes, memory.since = step_threshold(memory.axes, memory.since, pair.safe_lon, pair.safe_lat)
@@ -90,7 +90,7 @@ def remember(memory, pair, ego, user, dt):
     memory.age += 1
 
 
-@njit(cache=True)
+@compiled
 def forget_safe(memory):
     """Drop a memory of safety that a jump of the lane frame made worthless, in place (hole H5).
 
@@ -100,7 +100,7 @@ def forget_safe(memory):
         memory.age, memory.axes = 0, NEVER
 
 
-@njit(cache=True)
+@compiled
 def owes(memory, axis):
     """Does this pair owe a response on `axis` now? Danger from the start is answered on both."""
     return memory.since > 0 and (memory.axes == NEVER or (memory.axes & axis) != 0)
@@ -111,7 +111,7 @@ def owes(memory, axis):
 REAR, FRONT, CORRECT, WRONG = 0, 1, 2, 3
 
 
-@njit(cache=True)
+@compiled
 def role_of_ego(memory):
     """Longitudinal role of the ego at the threshold: REAR, FRONT, CORRECT or WRONG."""
     if memory.opposite:
@@ -122,7 +122,7 @@ def role_of_ego(memory):
     return REAR if memory.ego_is_rear else FRONT
 
 
-@njit(cache=True)
+@compiled
 def braking_owed(role, params):
     """Braking asked of a driver after the response time [m/s^2]; 0 for the car in front."""
     if role == FRONT:
@@ -130,7 +130,7 @@ def braking_owed(role, params):
     return params.a_min_brake_correct if role == CORRECT else params.a_min_brake
 
 
-@njit(cache=True)
+@compiled
 def longitudinal_response(role, tau, v, params):
     """Accelerations a driver may choose in danger, in the own driving direction (Def. 4).
 
@@ -157,7 +157,7 @@ def longitudinal_response(role, tau, v, params):
 # ---------------------------------------------------------------- lateral: Def. 8
 
 
-@njit(cache=True)
+@compiled
 def lateral_response(side, tau, u, params):
     """Lateral proper response as published, two-sided, read directionally (Def. 8, hole H11).
 
@@ -184,7 +184,7 @@ def lateral_response(side, tau, u, params):
     return -np.inf, np.inf, 0.0, np.inf
 
 
-@njit(cache=True)
+@compiled
 def lateral_speed_limit(frame, w_threshold, params, dt):
     """Fastest a driver may move toward the neighbour during a frame (one-sided Def. 8, hole H22) [m/s].
 
@@ -221,7 +221,7 @@ CUT_IN_SPEED = 0.1  # a car ahead counts as cutting in when it comes closer at t
 CUT_IN_GAP = 0.3  # ... or is nearer than this across the lane [m]
 
 
-@njit(cache=True)
+@compiled
 def owes_braking(memory, pair, rules):
     """Must the ego brake for this pair? Returns the reason: 0 none, 1 Def. 4, 2 behind a cut-in (hole H6)."""
     if memory.since == 0:
@@ -234,13 +234,13 @@ def owes_braking(memory, pair, rules):
     return 0
 
 
-@njit(cache=True)
+@compiled
 def owes_lateral_stop(memory, rules):
     """Must the ego stop moving toward this neighbour (Def. 8)?"""
     return rules.lateral and rules.memory and owes(memory, LAT)
 
 
-@njit(cache=True)
+@compiled
 def merge(bounds, memory, pair, params, rules, dt):
     """Tighten the bounds by what is owed to one pair.
 
