@@ -7,9 +7,9 @@ required distance at t_b is the sum of what each of the two may use up until the
   lateral        how far each may come toward the other
 
 so, as long as both stay inside their own share, they cannot touch. Hence a contact always has a
-culprit: somebody used more than that share. Displacements are judged, not speeds: heading, slip,
-reversing and turning all end up in them. The ego is held to more: its command is checked against
-Defs. 4 and 8 on every dangerous frame.
+culprit: somebody used more than that share. Displacements are judged, because heading, slip, reversing
+and turning all end up in them. On top of that the accelerations of both are held to Def. 4, and the
+ego's lateral speed to Def. 8, on every dangerous frame.
 """
 
 from typing import NamedTuple
@@ -34,6 +34,7 @@ from shield.response import (
     owes,
     remember,
     role_of_ego,
+    role_of_other,
 )
 
 KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
@@ -107,6 +108,16 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
             _blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
             share = _share_rear(tau, memory.v_other, other_params, dt)
             _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
+        if ahead == 0 and memory.age > 1 and not user.wreck:
+            duty, excess = _audit_acceleration(
+                role_of_other(memory),
+                tau - dt,
+                memory.speed_other - memory.acceleration_other * dt,
+                memory.acceleration_other,
+                other_params,
+                dt,
+            )
+            _blame_other(memory, duty, excess)
     if owes(memory, LAT):
         used = memory.approach_ego + max(memory.side * ego.speed * np.sin(ego.heading), 0.0) * step
         share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
@@ -133,7 +144,7 @@ def _share_front(tau, v, params, dt):
 @compiled
 def _share_toward(v, params, b, dt):
     """Farthest a car with speed `v` toward the other may ever come (Def. 2 and Section 4.1's table) [m]."""
-    return forward_reach(v, params.response_time, params.a_max_accel, b) + euler_margin(v, b, dt)
+    return forward_reach(v, params.response_time, params.a_max_accel, b, params.v_cap) + euler_margin(v, b, dt)
 
 
 @compiled
@@ -151,20 +162,29 @@ def audit_command(memory, ego, command, drift, params, dt):
     Returns:
       (duty, excess): index into `DUTIES`, 0 = kept, and how much it was broken by.
     """
-    a = command.acceleration
     if owes(memory, LON):
-        role = role_of_ego(memory)
-        lower, upper = longitudinal_response(role, memory.since * dt, ego.speed, params)
-        stops = ego.speed + a * dt <= _TOLERANCE  # the last braking step is partial
-        if a - upper > _TOLERANCE and not (stops and upper < 0.0):
-            return TOO_WEAK, a - upper
-        if role == FRONT and lower - a > _TOLERANCE:
-            return TOO_HARD, lower - a
+        duty, excess = _audit_acceleration(
+            role_of_ego(memory), memory.since * dt, ego.speed, command.acceleration, params, dt
+        )
+        if duty != KEPT:
+            return duty, excess
     if owes(memory, LAT):
         u = ego.speed * np.sin(ego.heading + command.slip) - drift
         excess = memory.side * u - lateral_speed_limit(memory.since, memory.w_ego, params, dt)
         if excess > _TOLERANCE:
             return TOWARD, excess
+    return KEPT, 0.0
+
+
+@compiled
+def _audit_acceleration(role, tau, v, a, params, dt):
+    """Def. 4 on one frame that starts `tau` after the threshold at speed `v`: (duty, excess), 0 = kept."""
+    lower, upper = longitudinal_response(role, tau, v, params)
+    stops = upper < 0.0 and v + a * dt <= _TOLERANCE  # the last braking step is partial
+    if a - upper > _TOLERANCE and not stops:
+        return TOO_WEAK, a - upper
+    if role == FRONT and lower - a > _TOLERANCE:
+        return TOO_HARD, lower - a
     return KEPT, 0.0
 
 

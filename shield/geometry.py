@@ -31,6 +31,8 @@ def _on_piece(piece, x, y):
         return along, across, piece[HEADING]
     # the centre of the circle lies 1/kappa to the right of the start
     angle = np.arctan2(along * np.sign(kappa), (1.0 / kappa - across) * np.sign(kappa))
+    middle = 0.5 * kappa * piece[LENGTH]  # half a circle either way from there
+    angle = middle + wrap_angle(angle - middle)
     radius = np.hypot(along, 1.0 / kappa - across)
     return angle / kappa, (1.0 / abs(kappa) - radius) * np.sign(kappa), piece[HEADING] + angle
 
@@ -103,8 +105,12 @@ def extents_within(length, width, heading, heading_bound):
         extents are those of the moment.
     """
     along, across = half_extents(length, width, heading)
-    bound = np.arcsin(heading_bound) if heading_bound < 1.0 else 0.0
-    along_bound, across_bound = half_extents(length, width, bound)
+    if heading_bound >= 1.0:
+        return along, across
+    # a box is longest along its diagonal, and widest too
+    bound, diagonal = np.arcsin(heading_bound), np.arctan2(width, length)
+    along_bound, _ = half_extents(length, width, np.minimum(bound, diagonal))
+    _, across_bound = half_extents(length, width, np.minimum(bound, 0.5 * np.pi - diagonal))
     return np.maximum(along, along_bound), np.maximum(across, across_bound)
 
 

@@ -16,9 +16,9 @@ def speed_after_response(v, rho, a, v_cap):
 
 @compiled
 def response_distance(v, rho, a, v_cap):
-    """Distance covered while accelerating at `a` for `rho`, speed limited to `v_cap` [m], for v >= 0."""
+    """Distance covered while accelerating at `a` for `rho`, speed limited to `v_cap` [m]."""
     v_rho = speed_after_response(v, rho, a, v_cap)
-    ramp = (v_rho - v) / np.where(a > 0.0, a, 1.0)  # time until the cap is reached
+    ramp = np.where(a > 0.0, (v_rho - v) / np.where(a > 0.0, a, 1.0), rho)  # until the cap is reached
     return 0.5 * (v + v_rho) * ramp + v_rho * (rho - ramp)
 
 
@@ -36,15 +36,15 @@ def reach(v, rho, a, b, v_cap):
 
 
 @compiled
-def forward_reach(v, rho, a, b):
+def forward_reach(v, rho, a, b, v_cap=np.inf):
     """Largest displacement ever reached in the positive direction, for any sign of `v` [m].
 
     The car accelerates at `a` for `rho` and then brakes at `b`; if it moves backwards at first it
     counts only from where it started, never less than 0. On the lateral axis this is one car's
     approach e(w) of Lemma 4; on the longitudinal one it makes Lemma 2 and 3 total.
     """
-    v_rho = v + a * rho
-    end = v * rho + 0.5 * a * rho**2 + np.maximum(v_rho, 0.0) ** 2 / (2 * b)
+    v_rho = speed_after_response(v, rho, a, v_cap)
+    end = response_distance(v, rho, a, v_cap) + stopping_distance(np.maximum(v_rho, 0.0), b)
     return np.maximum(end, 0.0)
 
 

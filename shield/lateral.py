@@ -96,7 +96,8 @@ def _largest_approach(w_left, w_right, left, right):
     rest_l = rho_l + np.maximum(w_left + left.a_lat_max_accel * rho_l, 0.0) / left.a_lat_min_brake
     rest_r = rho_r + np.maximum(w_right + right.a_lat_max_accel * rho_r, 0.0) / right.a_lat_min_brake
     largest = 0.0 * (w_left + w_right)
-    for start in (0.0 * rest_l, rho_l + 0.0 * rest_l, rho_r + 0.0 * rest_l, rest_l, rest_r + 0.0 * rest_l):
+    zero = 0.0 * largest  # gives every candidate the common shape
+    for start in (zero, rho_l + zero, rho_r + zero, rest_l + zero, rest_r + zero):
         v_l, a_l = _phase(start, w_left, left)
         v_r, a_r = _phase(start, w_right, right)
         v, a = v_l + v_r, a_l + a_r
@@ -145,6 +146,6 @@ def mu_lateral_velocity(time, path, k, mu):
             out = half if b > 0.0 else -half
             t_out = time[i] + (out - a) / (b - a) * (time[i + 1] - time[i])
             return out / (t_out - time[k])
-        if a * b < 0.0 or (b == 0.0 and i > k) or (a == 0.0 and b == 0.0):
-            return 0.0
+        if a * b < 0.0 or (a == 0.0 and b == 0.0):
+            return 0.0  # back at the start, or staying there
     return 0.0

@@ -47,7 +47,7 @@ def _closest_while_braking(v_rear, v_front, rear, front):
     v_r = speed_after_response(v_rear, rho, rear.a_max_accel, rear.v_cap)
     v_f = v_front - b_front * rho
     closing = v_r - v_f
-    both_roll = (v_f > 0.0) & (closing > 0.0) & (closing * b_front <= v_f * (b_rear - b_front))
+    both_roll = (closing > 0.0) & (closing * b_front <= v_f * (b_rear - b_front))
     d_response = response_distance(v_rear, rho, rear.a_max_accel, rear.v_cap)
     d_front = v_front * rho - 0.5 * b_front * rho**2
     needed = d_response - d_front + closing**2 / (2 * (b_rear - b_front))
@@ -90,8 +90,8 @@ def d_min_longitudinal(v_rear, v_front, facing, rear, front, b_rear, b_front):
     """
     if not facing and v_rear >= 0.0 and v_front >= 0.0:
         return d_min_same_direction(v_rear, v_front, rear, front)
-    d_rear = forward_reach(v_rear, rear.response_time, rear.a_max_accel, b_rear)
-    d_front = forward_reach(-v_front, front.response_time, front.a_max_accel, b_front)
+    d_rear = forward_reach(v_rear, rear.response_time, rear.a_max_accel, b_rear, rear.v_cap)
+    d_front = forward_reach(-v_front, front.response_time, front.a_max_accel, b_front, front.v_cap)
     return d_rear + d_front + np.maximum(rear.standstill_gap, front.standstill_gap)
 
 

@@ -44,7 +44,8 @@ class RSSParams(NamedTuple):
             finite = not math.isnan(value) and (name == "v_cap" or not math.isinf(value))
             if not finite or value < low or (strict and value == low):
                 accepted = f"> {low:g}" if strict else f">= {low:g}"
-                raise ValueError(f"{name} = {fields[name]!r} is out of range: expected a finite number {accepted}")
+                kind = "a number" if name == "v_cap" else "a finite number"
+                raise ValueError(f"{name} = {fields[name]!r} is out of range: expected {kind} {accepted}")
             values[name] = value
         params = cls(**values)
         _check_order(params, "a_min_brake", "a_max_brake")

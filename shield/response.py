@@ -32,6 +32,9 @@ MEMORY = np.dtype(
         ("travel_other", "f8"),
         ("approach_ego", "f8"),
         ("approach_other", "f8"),
+        # speed of the other at the last sample and its acceleration over the frame before [m/s], [m/s^2]
+        ("speed_other", "f8"),
+        ("acceleration_other", "f8"),
         # half lengths at t_b and half widths at the last sample: a car that turns grows [m]
         ("half_length_ego", "f8"),
         ("half_length_other", "f8"),
@@ -87,6 +90,8 @@ def remember(memory, pair, ego, user, dt):
         memory.approach_ego += memory.side * ego.u * dt + ego.half_width - memory.half_width_ego
         memory.approach_other += -memory.side * user.u * dt + user.half_width - memory.half_width_other
     memory.half_width_ego, memory.half_width_other = ego.half_width, user.half_width
+    memory.acceleration_other = (user.speed - memory.speed_other) / dt if memory.age > 0 else 0.0
+    memory.speed_other = user.speed
     memory.age += 1
 
 
@@ -120,6 +125,15 @@ def role_of_ego(memory):
             return FRONT
         return WRONG if memory.in_own_lane else CORRECT
     return REAR if memory.ego_is_rear else FRONT
+
+
+@compiled
+def role_of_other(memory):
+    """Longitudinal role of the other at the threshold."""
+    role = role_of_ego(memory)
+    if memory.opposite and role != FRONT:
+        return CORRECT if role == WRONG else WRONG
+    return REAR if role == FRONT and not memory.opposite else FRONT
 
 
 @compiled

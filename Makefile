@@ -1,0 +1,49 @@
+# Every target builds what it needs. PYTHON picks the interpreter that makes the environment:
+#   make compare PYTHON=python3.12
+# On Linux pip fetches PyTorch with CUDA; set PIP_EXTRA_INDEX_URL to PyTorch's CPU index for a small one.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+
+ARGS        ?=
+PYTEST_ARGS ?= -n 2
+
+.DEFAULT_GOAL := help
+.PHONY: help compare test bench check clean
+
+help:            ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
+	@echo
+	@echo "  PYTHON=$(PYTHON) makes the environment; ARGS='--total-timesteps 20000' goes to train.py."
+
+compare: $(VENV)/installed  ## train and compare shielded with unshielded PPO (about 10 minutes)
+	$(BIN)/python train.py $(ARGS)
+
+test: $(VENV)/installed-dev  ## run every test
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+bench: $(VENV)/installed-dev  ## run the benchmarks
+	$(BIN)/python -m pytest bench --benchmark-only
+
+check: $(VENV)/installed-dev  ## lint, formatting and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+clean:           ## remove the environment and every cache; runs/ stays
+	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	find . -name __pycache__ -type d -not -path './$(VENV)/*' -prune -exec rm -rf {} +
+
+# A stamp is newer than what it was made from, or the step runs again.
+$(VENV)/installed: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	  echo "rss-shield needs Python 3.11 or newer; $(PYTHON) is $$($(PYTHON) --version 2>/dev/null || echo missing)."; \
+	  echo "Name another interpreter: make PYTHON=python3.11"; exit 1; } >&2
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
+	@touch $@
+
+$(VENV)/installed-dev: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test,oracle,bench]'
+	@touch $@

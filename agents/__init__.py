@@ -1,0 +1,1 @@
+"""Everything that knows stable-baselines3 and torch."""

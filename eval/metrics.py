@@ -1,0 +1,98 @@
+"""What is measured per cell of the comparison: one table of metrics, one function that fills it in.
+
+A cell is a (train, test) pair: shield off or on while training, off or on while testing.
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from eval.stats import Interval, bootstrap_mean, bootstrap_median, paired_difference, wilson
+
+BLAMES = ("ego", "both", "other", "inherited", "none")
+
+
+class Metric(NamedTuple):
+    """A column of the table."""
+
+    name: str  # key in files, and column of `with_outcomes`
+    label: str  # heading
+    unit: str
+    statistic: Literal["rate", "mean", "median"]
+    scale: float  # shown value = scale * value
+    digits: int
+
+
+METRICS = (
+    Metric("crash", "crash", "%", "rate", 100, 0),
+    Metric("at_fault", "ego at fault", "%", "rate", 100, 0),
+    Metric("other", "other at fault", "%", "rate", 100, 0),
+    Metric("inherited", "inherited", "%", "rate", 100, 0),
+    Metric("none", "none", "%", "rate", 100, 0),
+    Metric("return", "return", "", "mean", 1, 1),
+    Metric("speed", "speed", "m/s", "mean", 1, 1),
+    Metric("length", "length", "steps", "mean", 1, 1),
+    Metric("override_share", "overridden", "%", "mean", 100, 0),
+    Metric("min_ttc", "min TTC", "s", "median", 1, 1),
+)
+
+
+def with_outcomes(episodes: pd.DataFrame) -> pd.DataFrame:
+    """Add one 0/1 column per outcome: crash = at_fault + other + inherited + none."""
+    blame, crash = episodes["blame"], episodes["crashed"].astype(bool)
+    at_fault = blame.isin(["ego", "both"])
+    return episodes.assign(
+        crash=crash,
+        at_fault=at_fault,
+        other=blame == "other",
+        inherited=blame == "inherited",
+        none=crash & ~blame.isin(["ego", "both", "other", "inherited"]),
+    )
+
+
+def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
+    """Every metric of every cell with n and a 95 % interval.
+
+    Args:
+      episodes: one row per episode; columns of `eval.rollout.run_episode` and train, test.
+
+    Returns:
+      Columns train, test, metric, value, low, high, n; cells in order of appearance. The bootstrap
+      draws from a generator of its own, so the same episodes give the same intervals.
+    """
+    rng = np.random.default_rng(0)
+    rows = []
+    for (train, test), cell in with_outcomes(episodes).groupby(["train", "test"], sort=False):
+        for metric in METRICS:
+            interval = _statistic(metric, cell[metric.name].to_numpy(float), rng)
+            rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict()})
+    return pd.DataFrame(rows)
+
+
+def differences(episodes: pd.DataFrame) -> pd.DataFrame:
+    """Every cell minus the first one, paired by training seed and episode seed; means of all metrics.
+
+    Returns:
+      Columns train, test, metric, value, low, high, n.
+    """
+    rng = np.random.default_rng(0)
+    keys = ["train_seed", "seed"]
+    cells = list(with_outcomes(episodes).groupby(["train", "test"], sort=False))
+    rows = []
+    for (train, test), cell in cells[1:]:
+        pairs = cell.merge(cells[0][1], on=keys, suffixes=("", "_baseline"))
+        for metric in METRICS:
+            sample = pairs[metric.name].to_numpy(float)
+            baseline = pairs[f"{metric.name}_baseline"].to_numpy(float)
+            interval = paired_difference(sample, baseline, rng)
+            rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict()})
+    return pd.DataFrame(rows, columns=["train", "test", "metric", *Interval._fields])
+
+
+def _statistic(metric: Metric, sample: np.ndarray, rng: np.random.Generator) -> Interval:
+    if metric.statistic == "rate":
+        return wilson(int(sample.sum()), sample.size)
+    if metric.statistic == "median":
+        return bootstrap_median(sample, rng)
+    return bootstrap_mean(sample, rng)

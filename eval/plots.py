@@ -1,0 +1,162 @@
+"""The two figures of a run: learning curves, and who was to blame. PNG and PDF, fit for a paper."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
+from eval.files import atomic
+from eval.metrics import BLAMES
+from eval.stats import Interval, bootstrap_mean, wilson
+
+# Okabe & Ito's colours, told apart with every common colour blindness
+ARM_COLOURS = {"unshielded": "#D55E00", "shielded": "#0072B2"}
+BLAME_COLOURS = {
+    "ego": "#D55E00",
+    "both": "#E69F00",
+    "other": "#56B4E9",
+    "inherited": "#BBBBBB",
+    "none": "#000000",
+}
+STYLE: Any = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+    "pdf.fonttype": 42,  # text stays text
+    "savefig.dpi": 200,
+}
+BINS = 10  # points of a learning curve
+
+
+def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
+    """Return, crashes, blame and overrides against timesteps, one line per arm with its 95 % band.
+
+    Args:
+      curve: one row per training episode of all arms and seeds; columns arm, train_seed, timesteps,
+        return, crashed, blame, override_share.
+      folder: gets learning_curve.png and learning_curve.pdf.
+    """
+    at_fault = curve["blame"].isin(["ego", "both"])
+    panels = (
+        ("Return per episode", curve["return"], "mean"),
+        ("Episodes with a crash", curve["crashed"], "rate"),
+        ("Episodes with the ego at fault", at_fault, "rate"),
+        ("Frames overridden by the shield", curve["override_share"], "share"),
+    )
+    edges = np.linspace(0, max(curve["timesteps"].max(), 1) if len(curve) else 1, BINS + 1)
+    rng = np.random.default_rng(0)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(6.5, 4.6))
+        for axes, (name, values, kind) in zip(figure.subplots(2, 2, sharex=True).flat, panels, strict=True):
+            for arm, rows in curve.groupby("arm", sort=False):
+                label = f"{arm} (n = {len(rows)} episodes, {_seeds(rows['train_seed'].nunique())})"
+                points = _binned(rows["timesteps"], values[rows.index], edges, kind == "rate", rng)
+                _line(axes, points, label, ARM_COLOURS.get(str(arm), "#009E73"))
+            axes.set_title(name, loc="left")
+            if kind != "mean":
+                axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+                axes.set_ylim(-0.03, 1.03)
+            if axes.get_subplotspec().is_last_row():
+                axes.set_xlabel("Training timesteps [decisions]")
+        handles, labels = axes.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        figure.suptitle(f"{title}: training (lines: means of {BINS} bins; bands: 95 % intervals)", size=9)
+        _save(figure, folder / "learning_curve")
+
+
+def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
+    """Who broke their duty in the crashes: one stacked bar per cell, n below it.
+
+    The left whisker is the 95 % interval of the ego's share (ego and both), the right one that of all
+    crashes.
+
+    Args:
+      episodes: one row per test episode; columns train, test, crashed, blame.
+      folder: gets blame.png and blame.pdf.
+    """
+    cells = list(episodes.groupby(["train", "test"], sort=False))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(6.5, 4.0))
+        axes = figure.subplots()
+        tops = np.zeros(len(cells))
+        for blame in BLAMES:
+            heights = np.array([_blamed(cell, blame).mean() for _, cell in cells])
+            axes.bar(
+                range(len(cells)),
+                heights,
+                bottom=tops,
+                width=0.6,
+                color=BLAME_COLOURS[blame],
+                edgecolor="white",
+                linewidth=0.5,
+                label=blame,
+            )
+            tops += heights
+        for i, (_, cell) in enumerate(cells):
+            at_fault = cell["blame"].isin(["ego", "both"])
+            _whisker(axes, i - 0.12, wilson(int(at_fault.sum()), len(cell)))
+            _whisker(axes, i + 0.12, wilson(int(cell["crashed"].sum()), len(cell)))
+        axes.set_xticks(
+            range(len(cells)),
+            [f"training: {train}\ntesting: {test}\nn = {len(cell)}" for (train, test), cell in cells],
+        )
+        axes.set_xlabel("Shield in training and in testing, test episodes")
+        axes.set_ylabel("Test episodes with a crash")
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        axes.set_ylim(bottom=0)
+        figure.legend(title="Who broke their duty", loc="outside lower center", ncols=len(BLAMES))
+        whiskers = "whiskers: 95 % Wilson intervals; left: ego or both, right: all crashes"
+        figure.suptitle(f"{title}: who is to blame ({whiskers})", size=9)
+        _save(figure, folder / "blame")
+
+
+def _blamed(cell: pd.DataFrame, blame: str) -> pd.Series:
+    """0/1 per episode; a crash without a verdict counts as "none"."""
+    if blame == "none":
+        return cell["crashed"].astype(bool) & ~cell["blame"].isin([b for b in BLAMES if b != "none"])
+    return cell["blame"] == blame
+
+
+def _binned(
+    timesteps: pd.Series, values: pd.Series, edges: np.ndarray, rate: bool, rng: np.random.Generator
+) -> list[tuple[float, Interval]]:
+    """(bin centre, mean with interval) of every bin that holds an episode."""
+    points = []
+    for low, high in pairwise(edges):
+        inside = values[(timesteps > low) & (timesteps <= high)].to_numpy(float)
+        if inside.size:
+            interval = wilson(int(inside.sum()), inside.size) if rate else bootstrap_mean(inside, rng)
+            points.append(((low + high) / 2, interval))
+    return points
+
+
+def _line(axes: Axes, points: list[tuple[float, Interval]], label: str, colour: str) -> None:
+    x = [centre for centre, _ in points]
+    axes.plot(x, [p.value for _, p in points], color=colour, marker="o", markersize=3, label=label)
+    axes.fill_between(x, [p.low for _, p in points], [p.high for _, p in points], color=colour, alpha=0.2, linewidth=0)
+
+
+def _whisker(axes: Axes, x: float, interval: Interval) -> None:
+    below, above = interval.value - interval.low, interval.high - interval.value
+    axes.errorbar(x, interval.value, [[below], [above]], color="black", capsize=2.5, linewidth=0.9, fmt="none")
+
+
+def _seeds(count: int) -> str:
+    return f"{count} seed" if count == 1 else f"{count} seeds"
+
+
+def _save(figure: Figure, stem: Path) -> None:
+    for kind in ("png", "pdf"):
+        with atomic(stem.with_suffix(f".{kind}")) as temporary:
+            # a fixed date: the same data give the same file
+            metadata = {"CreationDate": None} if kind == "pdf" else None
+            figure.savefig(temporary, format=kind, metadata=metadata)

@@ -1,0 +1,84 @@
+"""Everything a finished run reports, from its episodes and learning curves.
+
+`python -m eval.report runs/NAME` writes the report of a run anew, without training or testing.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import pandas as pd
+from rich.console import Console
+
+from eval.files import atomic, write_json
+from eval.metrics import differences, summarise
+from eval.plots import plot_blame, plot_learning_curve
+from eval.table import print_table, write_table
+
+SHIELD = {"unshielded": "off", "shielded": "on"}  # arm -> shield while training
+
+
+def write_report(folder: Path) -> None:
+    """Read episodes/*.csv and */learning_curve.csv of a run; print and write table, figures, results.
+
+    Writes episodes.csv, results.json, table.txt, .md, .tex and .csv, learning_curve.png and .pdf,
+    blame.png and .pdf.
+    """
+    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
+    arms, seeds = config["arms"], config["seeds"]
+    cells = [(arm, test, seed) for arm in arms for test in ("off", "on") for seed in seeds]
+    episodes = pd.concat(
+        [read_cell(cell_path(folder, arm, seed, test)) for arm, test, seed in cells],
+        ignore_index=True,
+    )
+    curve = pd.concat(
+        [
+            read_cell(folder / f"{arm}-seed{seed}" / "learning_curve.csv").assign(arm=arm, train_seed=seed)
+            for arm in arms
+            for seed in seeds
+        ],
+        ignore_index=True,
+    )
+    summary = summarise(episodes)
+    with atomic(folder / "episodes.csv") as temporary:
+        episodes.to_csv(temporary, index=False)
+    write_json(
+        folder / "results.json",
+        {
+            "config": config,
+            "cells": summary.to_dict("records"),
+            "differences_to_first_cell": differences(episodes).to_dict("records"),
+        },
+    )
+    n_seeds = f"{len(seeds)} training seed" + ("s" if len(seeds) > 1 else "")
+    title = (
+        f"PPO on {config['env_id']}, RSS preset {config['preset']}, "
+        f"{config['total_timesteps']} timesteps per arm, {n_seeds}"
+    )
+    write_table(summary, folder, title)
+    plot_learning_curve(curve, folder, str(config["env_id"]))
+    plot_blame(episodes, folder, str(config["env_id"]))
+    print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160))
+
+
+def cell_path(folder: Path, arm: str, seed: int, test: str) -> Path:
+    """The episodes of one trained model under one test condition."""
+    return folder / "episodes" / f"{arm}-seed{seed}-test-{test}.csv"
+
+
+def write_cell(path: Path, episodes: pd.DataFrame, arm: str, seed: int, test: str) -> None:
+    path.parent.mkdir(exist_ok=True)
+    labelled = episodes.assign(train=SHIELD[arm], test=test, train_seed=seed)
+    with atomic(path) as temporary:
+        labelled.to_csv(temporary, index=False)
+
+
+def read_cell(path: Path) -> pd.DataFrame:
+    """Read episodes as they were written: an empty text stays a text, a float keeps its last bit."""
+    return pd.read_csv(path, keep_default_na=False)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "config.json").exists():
+        sys.exit("usage: python -m eval.report RUN, the folder of a finished run, e.g. runs/highway-fast-v0")
+    write_report(Path(sys.argv[1]))

@@ -1,0 +1,79 @@
+"""The table in all its forms."""
+
+import io
+
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from eval.metrics import summarise
+from eval.table import print_table, table_frame, with_interval, write_table
+from tests.test_metrics import episodes_of
+
+
+@pytest.fixture(scope="module")
+def summary() -> pd.DataFrame:
+    cells = [("off", "off", "ego"), ("off", "on", ""), ("on", "off", "inherited"), ("on", "on", "")]
+    return summarise(pd.concat([episodes_of([blame] * 20, train, test) for train, test, blame in cells]))
+
+
+def printed(summary: pd.DataFrame, width: int) -> str:
+    stream = io.StringIO()
+    print_table(summary, "A title", Console(file=stream, width=width))
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "text"),
+    [
+        ((35.04, 26.4, 45.6, 0), "35 [26, 46]"),
+        ((1.25, -1.0, 3.04, 1), "1.2 [-1.0, 3.0]"),
+        ((2.0, float("nan"), float("nan"), 1), "2.0 [–]"),
+        ((float("nan"), 0.0, 100.0, 0), "–"),
+    ],
+)
+def test_a_value_is_shown_with_its_interval(numbers, text):
+    assert with_interval(*numbers) == text
+
+
+def test_there_is_one_row_per_cell_and_one_column_per_metric(summary):
+    frame = table_frame(summary)
+    assert frame[["train", "test", "n"]].to_numpy().tolist() == [
+        ["off", "off", "20"],
+        ["off", "on", "20"],
+        ["on", "off", "20"],
+        ["on", "on", "20"],
+    ]
+    # all 20 crash: 20 / (20 + 3.84) = 84 %; none of 20: 3.84 / 23.84 = 16 %
+    assert frame["crash [%]"].tolist() == ["100 [84, 100]", "0 [0, 16]"] * 2
+    assert frame["ego at fault [%]"].tolist() == ["100 [84, 100]"] + ["0 [0, 16]"] * 3
+    assert frame["speed [m/s]"].iloc[0] == "25.0 [25.0, 25.0]"
+
+
+def test_a_wide_terminal_gets_the_cells_as_rows_with_nothing_cut_off(summary):
+    text = printed(summary, 160)
+    assert "…" not in text
+    assert text.count("[84, 100]") == 4  # crash and at fault in one cell, crash and inherited in another
+    assert "A title" in text
+    assert "[low, high]: 95 % interval" in " ".join(text.split())
+
+
+def test_a_narrow_terminal_gets_the_cells_as_columns_with_nothing_cut_off(summary):
+    text = printed(summary, 80)
+    assert "…" not in text
+    assert text.count("[84, 100]") == 4  # crash and at fault in one cell, crash and inherited in another
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_every_form_of_the_table_is_written(summary, tmp_path):
+    write_table(summary, tmp_path, "A title")
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["table.csv", "table.md", "table.tex", "table.txt"]
+    rows = [line for line in (tmp_path / "table.md").read_text().splitlines() if line.startswith("|")]
+    assert len(rows) == 2 + 4
+    assert len({row.count("|") for row in rows}) == 1
+    latex = (tmp_path / "table.tex").read_text()
+    assert latex.count(r"\\") == 5
+    assert r"crash [\%]" in latex
+    numbers = pd.read_csv(tmp_path / "table.csv")
+    pd.testing.assert_frame_equal(numbers, summary)

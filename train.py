@@ -1,0 +1,252 @@
+"""Train PPO with and without the RSS shield, test each with and without it, and report who crashes."""
+
+import contextlib
+import functools
+import io
+import math
+import multiprocessing
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, NoReturn
+
+import tyro
+
+import envs
+from agents.ppo import available_devices, load_policy, rounded_timesteps, train
+from eval.progress import move_to, progress_bar
+from eval.report import cell_path, write_cell, write_report
+from eval.rollout import evaluate
+from eval.run_folder import open_run
+from shield.params import PRESETS, Preset, RSSParams
+
+TRAIN_MODE = {"unshielded": "monitor", "shielded": "override"}  # what the shield does in training
+TEST_MODE = {"off": "monitor", "on": "override"}  # a monitor assigns blame and changes nothing
+HELP = """Train PPO with and without the RSS shield, test each with and without it, report who crashes.
+
+One table at the end: shield {off, on} in training x {off, on} in testing. Everything is written
+to runs/NAME.
+
+examples:
+  python train.py
+      the comparison with its defaults, about 10 minutes on 2 cores
+  python train.py --total-timesteps 50000 --seeds 0 1 2 --eval-episodes 200
+      the same with more of everything
+  python train.py --env-id merge-v0 --preset slides
+      another road, stricter assumptions
+  python train.py --ego.response-time 0.5 --other.a-min-brake 4
+      single RSS parameters
+  python train.py --arms shielded --intervention-penalty 0.1
+      one arm, which pays for what the shield must correct
+  python train.py --resume
+      go on with a run that was stopped, with the options it was started with
+"""
+FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """None keeps the preset's value."""
+
+    response_time: float | None = None  # rho [s], > 0: delay before the driver must have reacted
+    a_max_accel: float | None = None  # [m/s^2], >= 0: strongest forward acceleration
+    a_min_brake: float | None = None  # [m/s^2], > 0: weakest braking that may be relied on
+    a_max_brake: float | None = None  # [m/s^2], >= a_min_brake: hardest braking of a leader
+    a_min_brake_correct: float | None = None  # [m/s^2], > 0, <= a_min_brake: in one's own lane
+    a_lat_max_accel: float | None = None  # [m/s^2], >= 0: strongest lateral acceleration
+    a_lat_min_brake: float | None = None  # [m/s^2], > 0: weakest lateral braking
+    mu: float | None = None  # [m], >= 0: width of the lateral wobble
+    standstill_gap: float | None = None  # lambda [m], >= 0: gap left when both stand
+    v_cap: float | None = None  # [m/s], > 0: speed above which nobody accelerates
+
+
+@dataclass(frozen=True)
+class Config:
+    """What `python train.py --help` shows; one option a field."""
+
+    env_id: str = "highway-fast-v0"
+    """Environment of highway-env."""
+    arms: tuple[str, ...] = ("unshielded", "shielded")
+    """What to train: unshielded (the shield only watches), shielded (it overrides), or both."""
+    total_timesteps: int = 5376
+    """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 768."""
+    seeds: tuple[int, ...] = (0,)
+    """Training seeds; each trains every arm once."""
+    preset: str = "simulator"
+    """RSS parameters by name: simulator, slides, ad-rss, carla, rodionova-conservative,
+    rodionova-assertive."""
+    ego: Overrides = Overrides()
+    """RSS parameters of the ego that replace the preset's."""
+    other: Overrides = Overrides()
+    """RSS parameters assumed of everybody else that replace the preset's."""
+    intervention_penalty: float = 0.0
+    """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward."""
+    eval_episodes: int = 60
+    """Test episodes per trained model and test condition, on the same seeds for all."""
+    n_envs: int = 2
+    """Environments stepped in parallel in training; test episodes played in parallel."""
+    device: str = "cpu"
+    """Where PPO learns: cpu, cuda or auto. For networks this small the CPU is faster."""
+    name: str = ""
+    """Folder of the run inside runs-dir; by default made from the options that differ from theirs."""
+    runs_dir: Path = Path("runs")
+    """Folder of all runs."""
+    resume: bool = False
+    """Go on with the run in the folder; nothing that is finished is repeated."""
+    overwrite: bool = False
+    """Throw the run in the folder away and start anew."""
+
+
+def main(arguments: list[str]) -> None:
+    config = parse(arguments)
+    check(config)
+    try:
+        preset = resolve(config)
+        make_env = {
+            mode: functools.partial(envs.make, config.env_id, shield=mode, params=preset) for mode in TEST_MODE.values()
+        }
+        for make in make_env.values():
+            make().close()  # a bad value shows now
+        folder = config.runs_dir / (config.name or run_name(config))
+        changes = open_run(folder, record(config, preset), resume=config.resume, overwrite=config.overwrite)
+    except (ValueError, OSError) as error:
+        fail(str(error))
+    for change in changes:
+        print(f"train.py: warning: {change}", file=sys.stderr)
+
+    trained = [(arm, seed) for seed in config.seeds for arm in config.arms]
+    for arm, seed in trained:
+        total = rounded_timesteps(config.n_envs, config.total_timesteps)
+        with progress_bar(total, f"train {arm}, seed {seed}", "step") as bar:
+            train(
+                functools.partial(make_env[TRAIN_MODE[arm]], intervention_penalty=config.intervention_penalty),
+                folder / f"{arm}-seed{seed}",
+                seed=seed,
+                total_timesteps=config.total_timesteps,
+                n_envs=config.n_envs,
+                device=config.device,
+                progress=functools.partial(move_to, bar),
+            )
+
+    for arm, seed in trained:
+        for test in TEST_MODE:
+            path = cell_path(folder, arm, seed, test)
+            if path.exists():
+                continue
+            episodes = evaluate(
+                make_env[TEST_MODE[test]],
+                functools.partial(load_policy, folder / f"{arm}-seed{seed}" / "model.zip"),
+                range(FIRST_TEST_SEED, FIRST_TEST_SEED + config.eval_episodes),
+                n_workers=config.n_envs,
+                description=f"test {arm}, seed {seed}, shield {test}",
+            )
+            write_cell(path, episodes, arm, seed, test)
+
+    write_report(folder)
+    print(f"\nEverything is in {folder}: table.md, results.json, learning_curve.png, blame.png, ...")
+
+
+def parse(arguments: list[str]) -> Config:
+    """Read the command line. What cannot be read ends in one line and exit code 2."""
+    printed = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(printed):
+            return tyro.cli(
+                Config, prog="train.py", description=HELP, args=arguments, config=(tyro.conf.FlagCreatePairsOff,)
+            )
+    except SystemExit as stop:
+        if not stop.code:  # --help
+            raise
+        _, *box = (line.strip("│| ") for line in printed.getvalue().splitlines() if line.strip())
+        message = " ".join(line for line in box if line.strip("─-╰╯+"))
+        fail(re.split("Argument helptext|For full helptext", message)[0] + "(see train.py --help)")
+
+
+def check(config: Config) -> None:
+    """Refuse what is out of range, naming option, value and range. RSS parameters: see `resolve`."""
+    arms, presets, devices = list(TRAIN_MODE), list(PRESETS), available_devices()
+    for option, good, expected in (
+        ("arms", is_set_of(config.arms, arms), f"one or more of {', '.join(arms)}"),
+        ("total_timesteps", config.total_timesteps >= 1, "at least 1"),
+        ("seeds", is_set_of(config.seeds, range(2**32)), "different whole numbers, 0 to 2**32 - 1"),
+        ("preset", config.preset in presets, f"one of {', '.join(presets)}"),
+        ("intervention_penalty", 0 <= config.intervention_penalty < math.inf, "a number >= 0"),
+        ("eval_episodes", config.eval_episodes >= 1, "at least 1"),
+        ("n_envs", 1 <= config.n_envs <= 256, "1 to 256"),
+        ("device", config.device in devices, f"one of {', '.join(devices)} on this machine"),
+        ("name", re.fullmatch(r"([\w=][\w=.,+-]*)?", config.name), "letters, digits and . , = + - _"),
+        ("resume", not (config.resume and config.overwrite), "--resume or --overwrite, not both"),
+    ):
+        if not good:
+            value = getattr(config, option)
+            shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
+            fail(f"--{option.replace('_', '-')} {shown} is out of range: expected {expected}")
+
+
+def is_set_of(values: tuple, accepted: Sequence) -> bool:
+    """At least one value, none twice, all of them accepted."""
+    return 0 < len(values) == len(set(values)) and all(value in accepted for value in values)
+
+
+def resolve(config: Config) -> Preset:
+    """The preset with the parameters given on the command line put in."""
+    preset = PRESETS[config.preset]
+    given = {"ego": _given(config.ego), "other": _given(config.other)}
+    for side, values in given.items():
+        try:
+            params = RSSParams.validated(**{**getattr(preset, side)._asdict(), **values})
+        except ValueError as error:
+            raise ValueError(f"--{side}: {error}") from None
+        preset = preset._replace(**{side: params})  # type: ignore[arg-type]
+    if "response_time" in given["ego"]:  # asked for, so never raised to one frame silently
+        preset = preset._replace(per_frame=False)
+    return preset
+
+
+def record(config: Config, preset: Preset) -> dict[str, Any]:
+    """All that the result depends on: every option but those that only say where and how to start."""
+    options = {f.name: getattr(config, f.name) for f in fields(config) if f.name not in _NOT_RECORDED}
+    parameters = {"ego": preset.ego._asdict(), "other": preset.other._asdict()}
+    return {**options, "ego": _given(config.ego), "other": _given(config.other)} | {
+        "parameters": {**parameters, "per_frame": preset.per_frame, "source": preset.source}
+    }
+
+
+def run_name(config: Config) -> str:
+    """The environment, then every option that differs from its default."""
+    default = Config()
+    parts = [config.env_id]
+    for option in fields(config):
+        value = getattr(config, option.name)
+        if option.name in (*_NOT_RECORDED, "env_id") or value == getattr(default, option.name):
+            continue
+        if isinstance(value, Overrides):
+            parts += [f"{option.name}.{name}={number}" for name, number in _given(value).items()]
+        else:
+            shown = "-".join(map(str, value)) if isinstance(value, tuple) else value
+            parts.append(f"{option.name}={shown}")
+    return ",".join(parts)
+
+
+_NOT_RECORDED = ("name", "runs_dir", "resume", "overwrite")
+
+
+def _given(overrides: Overrides) -> dict[str, float]:
+    return {name: value for name, value in asdict(overrides).items() if value is not None}
+
+
+def fail(message: str) -> NoReturn:
+    print(f"train.py: error: {message}", file=sys.stderr)
+    raise SystemExit(2)
+
+
+if __name__ == "__main__":
+    # worker processes are forked from a server that has imported the slow packages once
+    multiprocessing.set_forkserver_preload(["envs", "agents.ppo", "eval.rollout"])
+    try:
+        main(sys.argv[1:])
+    except KeyboardInterrupt:
+        print("\ntrain.py: stopped; the same command with --resume goes on", file=sys.stderr)
+        raise SystemExit(130) from None
