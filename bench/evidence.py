@@ -75,7 +75,7 @@ def _cases() -> dict[str, Case]:
             cases[f"{name}-{policy}"] = Case(env_id, policy, episodes, {})
     cases["fast-slower"] = Case("highway-fast-v0", "slower", 100, {})
     cases["fast-lanes"] = Case("highway-fast-v0", "lanes", 100, {})
-    cases["fast-continuous"] = Case("highway-fast-v0", "continuous", 300, CONTINUOUS)
+    cases["fast-continuous"] = Case("highway-fast-v0", "continuous", 100, CONTINUOUS)
     cases["fast-full-throttle"] = Case("highway-fast-v0", "full-throttle", 100, CONTINUOUS)
     reckless = {"other_vehicles_type": RECKLESS}
     cases["reckless-random"] = Case("highway-fast-v0", "random", 200, reckless)
