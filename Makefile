@@ -10,7 +10,7 @@ ARGS        ?=
 PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
-.PHONY: help compare test bench check clean
+.PHONY: help compare test bench evidence check clean
 
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -24,7 +24,10 @@ test: $(VENV)/installed-dev  ## run every test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 bench: $(VENV)/installed-dev  ## run the benchmarks
-	$(BIN)/python -m pytest bench --benchmark-only
+	$(BIN)/python -m pytest bench --benchmark-only -q -s
+
+evidence: $(VENV)/installed  ## play scripted policies under the shield and count who is to blame (hours)
+	$(BIN)/python bench/evidence.py $(ARGS)
 
 check: $(VENV)/installed-dev  ## lint, formatting and types
 	$(BIN)/ruff check .

@@ -9,7 +9,7 @@ from envs import make
 from envs.highway import ShieldedEgo
 from shield import PRESETS, d_min_lateral, d_min_opposite_direction, d_min_same_direction
 
-PAIRS = 100_000
+PAIRS = 10_000
 
 
 class TimedEgo(ShieldedEgo):
@@ -68,6 +68,21 @@ def test_batch_evaluation_of_distances(benchmark, formula):
         print(f"\n{formula.__name__}: {1e9 * benchmark.stats.stats.median / PAIRS:.1f} ns per pair")
 
 
-def test_one_check_of_ad_rss(benchmark):
-    core = pytest.importorskip("ad_rss.core", reason="install the extra 'oracle'", exc_type=ImportError)
-    benchmark.extra_info["library"] = core.__name__
+def test_one_distance_of_ad_rss(benchmark):
+    adrss = pytest.importorskip("tests.adrss_objects", reason="install the extra 'oracle'")
+    ego, other = PRESETS["ad-rss"].ego, PRESETS["ad-rss"].other
+    front, rear = adrss.become(adrss.new_object(), other, lon=20.0), adrss.become(adrss.new_object(), ego, lon=25.0)
+    distance = adrss.physics.Distance(0.0)
+    formula = adrss.rss.structured.calculateSafeLongitudinalDistanceSameDirection
+    benchmark(formula, front, rear, distance)
+    assert distance.mDistance == pytest.approx(d_min_same_direction(25.0, 20.0, ego, other), abs=1e-3)
+    if benchmark.stats:
+        print(f"\nad-rss, one same-direction distance: {1e6 * benchmark.stats.stats.median:.1f} us per call")
+
+
+def test_one_distance_from_python(benchmark):
+    ego, other = PRESETS["ad-rss"].ego, PRESETS["ad-rss"].other
+    d_min_same_direction(25.0, 20.0, ego, other)
+    benchmark(d_min_same_direction, 25.0, 20.0, ego, other)
+    if benchmark.stats:
+        print(f"\nd_min_same_direction, one pair from Python: {1e6 * benchmark.stats.stats.median:.1f} us per call")
