@@ -11,7 +11,16 @@ from shield.blame import DUTIES, VERDICTS, Log, judge_contact, judge_frame
 from shield.command import Command
 from shield.compiled import compiled
 from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_STEER, Body, shield_frame
-from shield.geometry import PIECE_FIELDS, extents_within, locate, wrap_angle
+from shield.geometry import (
+    ARC_START,
+    CURVATURE,
+    HEADING,
+    LENGTH,
+    PIECE_FIELDS,
+    extents_within,
+    locate,
+    wrap_angle,
+)
 from shield.pair import ROAD_USER
 from shield.params import RSSParams, Rules
 from shield.response import LAT, LON, MEMORY, forget_safe
@@ -68,20 +77,18 @@ def log_of(frames: list[Frame]) -> Log:
 
 
 def _pieces_of(lane) -> list[tuple[float, ...]]:
-    """Pieces of constant curvature (see `shield.geometry`) of one lane, arc length still 0."""
-    half_width = lane.width_at(0.0) / 2
+    """Pieces of constant curvature of one lane: start x, y, heading, curvature, length."""
     if isinstance(lane, StraightLane) and not isinstance(lane, SineLane):
         (x, y), heading = lane.position(0.0, 0.0), lane.heading_at(0.0)
-        return [(x, y, heading, 0.0, lane.length, 0.0, half_width)]
+        return [(x, y, heading, 0.0, lane.length)]
     if isinstance(lane, CircularLane):
         (x, y), heading = lane.position(0.0, 0.0), lane.heading_at(0.0)
         curvature = (1.0 if lane.clockwise else -1.0) / lane.radius
-        return [(x, y, heading, curvature, lane.length, 0.0, half_width)]
+        return [(x, y, heading, curvature, lane.length)]
     corners = np.array([lane.position(s, 0.0) for s in np.linspace(0.0, lane.length, int(lane.length // _SAMPLE) + 2)])
     steps = np.diff(corners, axis=0)
     return [
-        (x, y, np.arctan2(dy, dx), 0.0, np.hypot(dx, dy), 0.0, half_width)
-        for (x, y), (dx, dy) in zip(corners[:-1], steps, strict=True)
+        (x, y, np.arctan2(dy, dx), 0.0, np.hypot(dx, dy)) for (x, y), (dx, dy) in zip(corners[:-1], steps, strict=True)
     ]
 
 
@@ -104,7 +111,7 @@ def _neighbour(network, index, forward: bool):
 
 
 def road_through(network, index) -> np.ndarray:
-    """The road along a lane as `[K, 7]` pieces: the lane itself, what leads to it and what follows.
+    """The road along a lane as `[K, 6]` pieces: the lane itself, what leads to it and what follows.
 
     Arc length counts from the start of the lane `index`.
     """
@@ -120,17 +127,17 @@ def road_through(network, index) -> np.ndarray:
         if lane_index == index:
             offset = start
         for piece in _pieces_of(network.get_lane(lane_index)):
-            rows.append((*piece[:5], start, piece[6]))
-            start += piece[4]
+            rows.append((*piece, start))
+            start += piece[LENGTH]
     road = np.array(rows, dtype=float).reshape(-1, PIECE_FIELDS)
-    road[:, 5] -= offset
+    road[:, ARC_START] -= offset
     return road
 
 
 def _same_frame(road: np.ndarray, other: np.ndarray) -> bool:
     """Do two roads differ by a lateral shift at most? Then no gap jumps between them."""
-    straight = not (road[:, 3].any() or other[:, 3].any())
-    return straight and bool(np.ptp(np.concatenate([road[:, 2], other[:, 2]])) < 1e-9)
+    straight = not (road[:, CURVATURE].any() or other[:, CURVATURE].any())
+    return straight and bool(np.ptp(np.concatenate([road[:, HEADING], other[:, HEADING]])) < 1e-9)
 
 
 @compiled

@@ -26,7 +26,6 @@ class Report(NamedTuple):
 
 RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN = 1, 2, 4
 
-
 _STANDSTILL = 1e-6  # below this speed nothing moves sideways [m/s]
 
 
@@ -109,7 +108,7 @@ def always_on(ego, params, rules, dt):
 def restrict(nominal, bounds, ego, body, rules, dt):
     """The command nearest to the nominal one inside the bounds."""
     a = min(max(nominal.acceleration, bounds.a_lower), bounds.a_upper)
-    if bounds.a_lower > -np.inf:
+    if bounds.a_lower > -np.inf or bounds.a_upper < 0.0:
         a = max(a, -max(ego.speed, 0.0) / dt)  # never reverse; the last braking step is partial
     return Command(a, _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt))
 
@@ -121,12 +120,12 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     With psi the heading relative to the lane, slip beta moves the car sideways at v sin(psi + beta)
     at once and turns it by G sin(beta), G = v dt / half_wheelbase. For G > 1 the heading overshoots,
     for G > 2 holding the lateral speed alone makes it diverge: so the lateral speed of this frame, the
-    one that the next heading commits to and the heading are bounded together. The three
+    one that the next heading commits to, the course and the heading are bounded together. Their
     intervals always share the slip that straightens the car (see `_straightening_slip`): it moves
     the car no faster than its heading already does, so no bound that was kept so far is lost.
     """
     v = ego.speed
-    if v < _STANDSTILL or bounds.left == np.inf:
+    if v < _STANDSTILL or (bounds.left == np.inf and bounds.right == np.inf):
         return slip
     v_next = max(v + a * dt, _STANDSTILL)
     psi, gain = ego.heading, v * dt / body.half_wheelbase

@@ -1,16 +1,16 @@
 """Lane frames and oriented boxes (Section 3.2 of the paper, metric lateral coordinates).
 
-A road is a chain of pieces of constant curvature, `[K, 7]` float64, one row per piece:
-start x, start y, start heading, curvature (positive turns right), length, arc length at the start,
-half width of the lane. y points to the right of the driving direction.
+A road is a chain of pieces of constant curvature, `[K, 6]` float64, one row per piece:
+start x, start y, start heading, curvature (positive turns right), length, arc length at the start.
+y points to the right of the driving direction.
 """
 
 import numpy as np
 
 from shield.compiled import compiled
 
-PIECE_FIELDS = 7
-X, Y, HEADING, CURVATURE, LENGTH, ARC_START, HALF_WIDTH = range(PIECE_FIELDS)
+PIECE_FIELDS = 6
+X, Y, HEADING, CURVATURE, LENGTH, ARC_START = range(PIECE_FIELDS)
 _STRAIGHT = 1e-9  # curvature below which a piece is straight [1/m]
 
 
@@ -44,7 +44,7 @@ def locate(road, x, y):
     The piece whose lane is nearest counts; beyond both ends of the chain the road goes on straight.
 
     Args:
-      road: `[K, 7]` pieces.
+      road: `[K, 6]` pieces.
       x, y: position [m].
 
     Returns:

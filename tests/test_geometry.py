@@ -20,7 +20,7 @@ def build(pieces, x=3.0, y=-7.0, heading=0.4):
     """Chain of (curvature, length), smooth at the joints, in the complex plane: a heading is exp(i psi)."""
     position, arc, rows = complex(x, y), 0.0, []
     for kappa, length in pieces:
-        rows.append((position.real, position.imag, heading, kappa, length, arc, 2.0))
+        rows.append((position.real, position.imag, heading, kappa, length, arc))
         turn = 1j * kappa * length
         position += np.exp(1j * heading) * (length if kappa == 0.0 else length * (np.exp(turn) - 1.0) / turn)
         heading, arc = heading + kappa * length, arc + length
@@ -31,7 +31,7 @@ def build(pieces, x=3.0, y=-7.0, heading=0.4):
 def at(road, s, y):
     """Position and lane heading at arc length `s` and lateral offset `y`; straight on beyond both ends."""
     k = int(np.clip(np.searchsorted(road[:, 5], s, side="right") - 1, 0, len(road) - 1))
-    x0, y0, heading, kappa, length, arc, _ = road[k]
+    x0, y0, heading, kappa, length, arc = road[k]
     along = s - arc
     curved = float(np.clip(along, 0.0, length))
     position = complex(x0, y0)
@@ -49,20 +49,20 @@ def at(road, s, y):
 
 def test_a_straight_lane_by_hand():
     # along the y axis of the plane: what is right of it has smaller x
-    road = np.array([[2.0, 0.0, np.pi / 2, 0.0, 100.0, 1000.0, 2.0]])
+    road = np.array([[2.0, 0.0, np.pi / 2, 0.0, 100.0, 1000.0]])
     assert locate(road, -1.0, 30.0) == pytest.approx((1030.0, 3.0, np.pi / 2, 0.0))
 
 
 def test_a_right_turn_around_the_origin_by_hand():
     # radius 50 about the origin, from (50, 0) towards (0, 50): the centre is on the right
-    road = np.array([[50.0, 0.0, np.pi / 2, 1 / 50, 50.0 * np.pi, 0.0, 2.0]])
+    road = np.array([[50.0, 0.0, np.pi / 2, 1 / 50, 50.0 * np.pi, 0.0]])
     assert locate(road, 0.0, 51.0) == pytest.approx((25.0 * np.pi, -1.0, np.pi, 1 / 50))
     assert locate(road, 36.0, 36.0)[:2] == pytest.approx((12.5 * np.pi, 50.0 - 36.0 * np.sqrt(2.0)))
 
 
 def test_a_left_turn_by_hand():
     # radius 50 about (0, -50), from the origin along x: the centre is on the left
-    road = np.array([[0.0, 0.0, 0.0, -1 / 50, 60.0, 0.0, 2.0]])
+    road = np.array([[0.0, 0.0, 0.0, -1 / 50, 60.0, 0.0]])
     x, y = 52.0 * np.sin(0.5), -50.0 + 52.0 * np.cos(0.5)
     assert locate(road, x, y) == pytest.approx((25.0, 2.0, -0.5, -1 / 50))
 
