@@ -123,7 +123,9 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
         share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
         _blame_ego(memory, TOO_CLOSE, used - share - slack)
         used = memory.approach_other + max(-memory.side * user.speed * np.sin(user.heading), 0.0) * step
-        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt))
+        # a driver may already use the first frame's growth on it; mu has room for that
+        first_frame = other_params.a_lat_max_accel * dt**2
+        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt) - first_frame)
 
 
 @compiled
