@@ -20,7 +20,7 @@ from eval.progress import move_to, progress_bar
 from eval.report import cell_path, write_cell, write_report
 from eval.rollout import evaluate
 from eval.run_folder import open_run
-from shield.params import PRESETS, Preset, RSSParams
+from shield.params import PRESETS, Preset, RSSParams, Rules
 
 TRAIN_MODE = {"unshielded": "monitor", "shielded": "override"}  # what the shield does in training
 TEST_MODE = {"off": "monitor", "on": "override"}  # a monitor assigns blame and changes nothing
@@ -210,7 +210,12 @@ def record(config: Config, preset: Preset) -> dict[str, Any]:
     options = {f.name: getattr(config, f.name) for f in fields(config) if f.name not in _NOT_RECORDED}
     parameters = {"ego": preset.ego._asdict(), "other": preset.other._asdict()}
     return {**options, "ego": _given(config.ego), "other": _given(config.other)} | {
-        "parameters": {**parameters, "per_frame": preset.per_frame, "source": preset.source}
+        "parameters": {
+            **parameters,
+            "per_frame": preset.per_frame,
+            "source": preset.source,
+            "rules": Rules()._asdict(),  # the margins of the published table
+        }
     }
 
 
