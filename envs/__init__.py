@@ -1,6 +1,7 @@
 """The shield on simulators."""
 
 from envs.scenarios import make
+from envs.vector import make_vec
 from envs.wrapper import ShieldWrapper
 
-__all__ = ["ShieldWrapper", "make"]
+__all__ = ["ShieldWrapper", "make", "make_vec"]

@@ -1,0 +1,369 @@
+"""What an engine runs: a highway-env configuration, checked and turned into numbers.
+
+The stock environment is built once and asked for its configuration, roads and spaces, so every
+default and every override means what it means there.
+"""
+
+from typing import NamedTuple
+
+import gymnasium as gym
+import highway_env  # noqa: F401  registers the environments
+import numpy as np
+from gymnasium import spaces
+from highway_env import utils
+from highway_env.envs.common.action import ContinuousAction, DiscreteMetaAction
+from highway_env.envs.common.observation import ExitObservation, KinematicObservation, TimeToCollisionObservation
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
+
+from envs.fast.network import Network, compile_network
+from envs.fast.state import REWARDS
+
+HIGHWAY, MERGE, TWO_WAY, EXIT, ROUNDABOUT = range(5)
+KINEMATICS, TIME_TO_COLLISION = range(2)
+PRESENCE, X, Y, VX, VY, HEADING, COS_H, SIN_H = range(8)
+FEATURES = ("presence", "x", "y", "vx", "vy", "heading", "cos_h", "sin_h")
+
+CONFIG = np.dtype(
+    [
+        ("scenario", "i4"),
+        ("dt", "f8"),  # length of a frame [s]
+        ("frames", "i4"),  # per decision
+        ("period", "f8"),  # length of a decision [s]
+        ("duration", "f8"),  # of an episode [s], inf = unlimited
+        ("max_steps", "i4"),  # decisions of an episode, 0 = unlimited
+        ("offroad_terminal", "?"),
+        ("meta_actions", "?"),  # else acceleration and steering
+        ("max_speed", "f8"),  # of a directly driven ego [m/s]
+        ("min_speed", "f8"),
+        # traffic
+        ("acc_max", "f8"),  # [m/s^2]
+        ("comfort_acc_max", "f8"),
+        ("comfort_acc_min", "f8"),
+        ("distance_wanted", "f8"),  # [m]
+        ("time_wanted", "f8"),  # [s]
+        ("min_acc_gain", "f8"),  # [m/s^2]
+        ("max_braking_imposed", "f8"),
+        ("lane_change_delay", "f8"),  # [s]
+        ("delta", "f8"),
+        ("delta_low", "f8"),
+        ("delta_high", "f8"),
+        # scene
+        ("traffic", "i4"),  # vehicles besides the ego
+        ("traffic_checks", "?"),  # they look for collisions themselves
+        ("ego_lane", "i4"),  # -1 = drawn
+        ("ego_spacing", "f8"),
+        ("traffic_spacing", "f8"),
+        ("lanes_factor", "f8"),  # more lanes, denser traffic
+        ("main_lane", "i4"),  # first lane of the road where the scene plays
+        ("side_lane", "i4"),  # where others come from
+        ("other_lane", "i4"),
+        ("destination", "i4"),  # of the incoming car, -1 = drawn
+        ("obstacle_x", "f8"),  # [m]
+        ("obstacle_y", "f8"),
+        ("end_x", "f8"),  # the episode ends beyond it [m]
+        ("goal_lane", "i4"),  # reaching one of them is a success
+        ("other_goal_lane", "i4"),
+        # reward
+        *[(f"weight_{k}", "f8") for k in range(REWARDS)],
+        ("normalize_reward", "?"),
+        ("reward_low", "f8"),
+        ("reward_high", "f8"),
+        ("speed_low", "f8"),  # [m/s]
+        ("speed_high", "f8"),
+        # observation
+        ("observation", "i4"),
+        ("rows", "i4"),  # observed vehicles, the ego included
+        ("absolute", "?"),
+        ("see_behind", "?"),
+        ("obstacles", "?"),
+        ("normalize", "?"),
+        ("clips", "?"),
+        ("exit_lane", "i4"),  # the ego's x counts along it, -1 = along the world
+        ("speeds", "i4"),  # size of a time-to-collision grid
+        ("lanes", "i4"),
+        ("times", "i4"),
+    ],
+    align=True,
+)
+
+
+class Scenario(NamedTuple):
+    """An environment ready to be run by the engine."""
+
+    env_id: str
+    config: np.ndarray  # `[1]` CONFIG
+    network: Network
+    target_speeds: np.ndarray  # `[K]` of meta-actions [m/s]
+    features: np.ndarray  # `[F]` observed features
+    ranges: np.ndarray  # `[F, 2]` their ranges, nan = not scaled, -inf..inf = by the number of lanes
+    labels: np.ndarray  # meta-action of each action, as in `DiscreteMetaAction.ACTIONS_ALL`
+    connected: np.ndarray  # `[L, L]` may a car on one lane meet a car on another, for times to collision
+    lane_odds: np.ndarray  # cumulative odds of the lanes that traffic starts on
+    reward_names: tuple[str, ...]
+    capacity: int  # road users at most
+    observation_space: spaces.Space
+    action_space: spaces.Space
+    stock: gym.Env  # the stock environment, without wrappers
+
+    def commands(self, actions: np.ndarray) -> np.ndarray:
+        """Acceleration [m/s^2] and steering [rad] of continuous actions `[E, A]`, as `[E, 2]` float64.
+
+        The arithmetic is that of highway-env, in the type of the actions.
+        """
+        kind = self.stock.action_type
+        if kind.clip:
+            actions = np.clip(actions, -1, 1)
+        out = np.zeros((len(actions), 2))
+        if kind.longitudinal:
+            out[:, 0] = utils.lmap(actions[:, 0], [-1, 1], kind.acceleration_range)
+        if kind.lateral:
+            out[:, 1] = utils.lmap(actions[:, -1], [-1, 1], kind.steering_range)
+        return out
+
+
+class Unsupported(ValueError):
+    """A feature of highway-env that the engine does not have."""
+
+    def __init__(self, what: str, expected: str) -> None:
+        super().__init__(f"the fast engine does not support {what}; expected {expected}")
+
+
+SCENARIOS = {
+    "highway-v0": HIGHWAY,
+    "highway-fast-v0": HIGHWAY,
+    "merge-v0": MERGE,
+    "merge-v1": MERGE,
+    "two-way-v0": TWO_WAY,
+    "exit-v0": EXIT,
+    "exit-v1": EXIT,
+    "roundabout-v0": ROUNDABOUT,
+    "roundabout-v1": ROUNDABOUT,
+}
+_DESTINATIONS: dict[int, tuple[str, ...]] = {EXIT: ("3",), ROUNDABOUT: ("nxs", "exr", "sxr", "nxr")}
+
+
+def compile_scenario(env_id: str, config: dict | None = None) -> Scenario:
+    """Everything the engine needs to run an environment.
+
+    Raises:
+      ValueError: the environment or something in its configuration is not supported; the message
+        names it.
+    """
+    if env_id not in SCENARIOS:
+        raise Unsupported(f"env_id = {env_id!r}", f"one of {', '.join(SCENARIOS)}")
+    wrapped = gym.make(env_id, config=config)
+    env = wrapped.unwrapped
+    given = env.config
+    _check(given)
+    record = np.zeros(1, CONFIG)
+    scenario = SCENARIOS[env_id]
+    record["scenario"] = scenario
+    record["end_x"], record["exit_lane"] = np.inf, -1
+    record["dt"] = 1 / given["simulation_frequency"]
+    record["frames"] = int(given["simulation_frequency"] // given["policy_frequency"])
+    record["period"] = 1 / given["policy_frequency"]
+    record["max_steps"] = wrapped.spec.max_episode_steps or 0
+    record["duration"] = given.get("duration", np.inf)
+    _fill_traffic(record)
+    target_speeds, labels = _fill_action(record, env.action_type)
+    features, ranges, connected = _fill_observation(record, env)
+    if scenario in (MERGE, TWO_WAY, ROUNDABOUT) and not record["meta_actions"]:
+        raise Unsupported(f"action type {type(env.action_type).__name__} in {env_id}", "DiscreteMetaAction")
+    number = {index: i for i, index in enumerate(env.road.network.lanes_dict())}
+    reward_names = _FILL_SCENE[scenario](record, given, env, number)
+    network = compile_network(
+        env.road.network, given["neighbour_vehicles_connected_lanes"], _DESTINATIONS.get(scenario, ())
+    )
+    return Scenario(
+        env_id,
+        record,
+        network,
+        target_speeds,
+        features,
+        ranges,
+        labels,
+        connected,
+        _lane_odds(given) if scenario == EXIT else np.ones(1),
+        reward_names,
+        len(env.road.vehicles) + len(env.road.objects),
+        env.observation_space,
+        env.action_space,
+        env,
+    )
+
+
+def _check(given: dict) -> None:
+    idm = "highway_env.vehicle.behavior.IDMVehicle"
+    if given["other_vehicles_type"] != idm:
+        raise Unsupported(f"other_vehicles_type = {given['other_vehicles_type']!r}", repr(idm))
+    if given.get("controlled_vehicles", 1) != 1:
+        raise Unsupported(f"controlled_vehicles = {given['controlled_vehicles']}", "1")
+    if given["manual_control"]:
+        raise Unsupported("manual_control = True", "False")
+    if given["simulation_frequency"] < given["policy_frequency"]:
+        raise Unsupported(
+            f"simulation_frequency = {given['simulation_frequency']}", f">= {given['policy_frequency']}"
+        )
+
+
+def _fill_traffic(record) -> None:
+    # `IntersectionEnv` rewrites some of these attributes of the class for everybody; the values of
+    # the other environments are those that the class is defined with
+    record["comfort_acc_max"], record["comfort_acc_min"], record["distance_wanted"] = 3.0, -5.0, 10.0
+    record["acc_max"], record["time_wanted"] = IDMVehicle.ACC_MAX, IDMVehicle.TIME_WANTED
+    record["min_acc_gain"] = IDMVehicle.LANE_CHANGE_MIN_ACC_GAIN
+    record["max_braking_imposed"] = IDMVehicle.LANE_CHANGE_MAX_BRAKING_IMPOSED
+    record["lane_change_delay"] = IDMVehicle.LANE_CHANGE_DELAY
+    record["delta"] = IDMVehicle.DELTA
+    record["delta_low"], record["delta_high"] = IDMVehicle.DELTA_RANGE
+
+
+def _fill_action(record, action_type) -> tuple[np.ndarray, np.ndarray]:
+    record["max_speed"], record["min_speed"] = Vehicle.MAX_SPEED, Vehicle.MIN_SPEED
+    if type(action_type) is DiscreteMetaAction:
+        record["meta_actions"], record["speeds"] = True, len(action_type.target_speeds)
+        numbers = {label: number for number, label in DiscreteMetaAction.ACTIONS_ALL.items()}
+        labels = [numbers[action_type.actions[k]] for k in range(len(action_type.actions))]
+        return np.asarray(action_type.target_speeds, float), np.array(labels, np.int32)
+    if type(action_type) is ContinuousAction:
+        if action_type.dynamical:
+            raise Unsupported("action option dynamical = True", "False")
+        if action_type.speed_range:
+            record["min_speed"], record["max_speed"] = action_type.speed_range
+        return np.zeros(1), np.zeros(0, np.int32)
+    raise Unsupported(f"action type {type(action_type).__name__}", "DiscreteMetaAction or ContinuousAction")
+
+
+def _fill_observation(record, env) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    seen = env.observation_type
+    if type(seen) is TimeToCollisionObservation:
+        return _fill_times(record, env)
+    if type(seen) not in (KinematicObservation, ExitObservation):
+        raise Unsupported(f"observation type {type(seen).__name__}", "Kinematics, ExitObservation or TimeToCollision")
+    if seen.order != "sorted":
+        raise Unsupported(f"observation option order = {seen.order!r}", "'sorted'")
+    if seen.vehicles_count < 2:
+        raise Unsupported(f"observation option vehicles_count = {seen.vehicles_count}", ">= 2")
+    for name in seen.features:
+        if name not in FEATURES:
+            raise Unsupported(f"observed feature {name!r}", f"one of {', '.join(FEATURES)}")
+        if name == "heading" and env.road.objects and seen.include_obstacles:
+            raise Unsupported("observed feature 'heading' of obstacles", "include_obstacles = False")
+    record["observation"], record["rows"] = KINEMATICS, seen.vehicles_count
+    record["absolute"], record["see_behind"] = seen.absolute, seen.see_behind
+    record["obstacles"], record["normalize"], record["clips"] = seen.include_obstacles, seen.normalize, seen.clip
+    if type(seen) is ExitObservation:
+        road = [i for i, index in enumerate(env.road.network.lanes_dict()) if index[:2] == ("1", "2")]
+        record["obstacles"], record["exit_lane"] = False, road[-1]
+    # an observation fills in its default ranges when it is first made
+    defaults = {"x": 5 * Vehicle.MAX_SPEED, "vx": 2 * Vehicle.MAX_SPEED, "vy": 2 * Vehicle.MAX_SPEED, "y": np.inf}
+    ranges = np.full((len(seen.features), 2), np.nan)
+    asked = env.config["observation"].get("features_range")
+    for k, name in enumerate(seen.features):
+        if asked and name in asked:
+            ranges[k] = asked[name]
+        elif not asked and name in defaults:
+            ranges[k] = -defaults[name], defaults[name]
+    features = np.array([FEATURES.index(name) for name in seen.features], np.int32)
+    return features, ranges, np.zeros((0, 0), bool)
+
+
+def _fill_times(record, env) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    if not record["meta_actions"]:
+        raise Unsupported(f"TimeToCollision with {type(env.action_type).__name__}", "DiscreteMetaAction")
+    if env.vehicle.route:
+        raise Unsupported("TimeToCollision for an ego with a route", "Kinematics")
+    network = env.road.network
+    indices = list(network.lanes_dict())
+    record["observation"] = TIME_TO_COLLISION
+    record["lanes"] = max(len(network.all_side_lanes(index)) for index in indices)
+    record["times"] = env.observation_space.shape[2]
+    connected = np.array([[network.is_connected_road(a, b, depth=3) for b in indices] for a in indices])
+    return np.zeros(0, np.int32), np.zeros((0, 2)), connected
+
+
+def _lane_odds(given: dict) -> np.ndarray:
+    """As `np.random.Generator.choice` turns the odds of `ExitEnv` into thresholds."""
+    lanes = np.arange(given["lanes_count"])
+    odds = (lanes / lanes.sum()).cumsum()
+    return odds / odds[-1]
+
+
+def _set_weights(record, given: dict, names: tuple[str, ...]) -> tuple[str, ...]:
+    for k, name in enumerate(names):
+        record[f"weight_{k}"] = given.get(name, 0)
+    return names
+
+
+def _fill_highway(record, given: dict, env, number: dict) -> tuple[str, ...]:
+    record["offroad_terminal"] = given["offroad_terminal"]
+    record["traffic"] = given["vehicles_count"]
+    record["traffic_checks"] = env.road.vehicles[-1].check_collisions
+    record["ego_lane"] = -1 if given["initial_lane_id"] is None else given["initial_lane_id"]
+    record["ego_spacing"], record["traffic_spacing"] = given["ego_spacing"], 1 / given["vehicles_density"]
+    record["lanes_factor"] = np.exp(-5 / 40 * given["lanes_count"])
+    record["normalize_reward"] = given["normalize_reward"]
+    record["reward_low"] = given["collision_reward"]
+    record["reward_high"] = given["high_speed_reward"] + given["right_lane_reward"]
+    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    return _set_weights(
+        record, given, ("collision_reward", "right_lane_reward", "high_speed_reward", "on_road_reward")
+    )
+
+
+def _fill_merge(record, given: dict, env, number: dict) -> tuple[str, ...]:
+    record["main_lane"], record["side_lane"] = number["a", "b", 0], number["j", "k", 0]
+    record["other_lane"] = number["b", "c", 2]
+    record["obstacle_x"], record["obstacle_y"] = env.road.objects[0].position
+    record["end_x"] = 370
+    record["normalize_reward"] = True
+    record["reward_low"] = given["collision_reward"] + given["merging_speed_reward"]
+    record["reward_high"] = given["high_speed_reward"] + given["right_lane_reward"]
+    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    return _set_weights(
+        record,
+        given,
+        ("collision_reward", "right_lane_reward", "high_speed_reward", "lane_change_reward", "merging_speed_reward"),
+    )
+
+
+def _fill_two_way(record, given: dict, env, number: dict) -> tuple[str, ...]:
+    record["main_lane"], record["side_lane"] = number["a", "b", 0], number["b", "a", 0]
+    return _set_weights(record, given, ("high_speed_reward", "left_lane_reward"))
+
+
+def _fill_exit(record, given: dict, env, number: dict) -> tuple[str, ...]:
+    record["traffic"] = given["vehicles_count"]
+    record["ego_spacing"], record["traffic_spacing"] = given["ego_spacing"], 1 / given["vehicles_density"]
+    record["main_lane"] = number["0", "1", 0]
+    record["lanes_factor"] = np.exp(-5 / 40 * given["lanes_count"])
+    record["goal_lane"] = number["1", "2", given["lanes_count"]]
+    record["other_goal_lane"] = number["2", "exit", 0]
+    record["normalize_reward"] = given["normalize_reward"]
+    record["reward_low"], record["reward_high"] = given["collision_reward"], given["goal_reward"]
+    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    return _set_weights(
+        record, given, ("collision_reward", "goal_reward", "high_speed_reward", "right_lane_reward")
+    )
+
+
+def _fill_roundabout(record, given: dict, env, number: dict) -> tuple[str, ...]:
+    record["main_lane"] = number["ser", "ses", 0]
+    record["side_lane"], record["other_lane"] = number["we", "sx", 0], number["eer", "ees", 0]
+    asked = given["incoming_vehicle_destination"]
+    record["destination"] = -1 if asked is None else range(3)[asked]
+    record["normalize_reward"] = given["normalize_reward"]
+    record["reward_low"], record["reward_high"] = given["collision_reward"], given["high_speed_reward"]
+    return _set_weights(
+        record, given, ("collision_reward", "high_speed_reward", "lane_change_reward", "on_road_reward")
+    )
+
+
+_FILL_SCENE = {
+    HIGHWAY: _fill_highway,
+    MERGE: _fill_merge,
+    TWO_WAY: _fill_two_way,
+    EXIT: _fill_exit,
+    ROUNDABOUT: _fill_roundabout,
+}

@@ -1,0 +1,281 @@
+"""What each vehicle decides on a frame: speed and steering controllers, IDM, MOBIL, route following.
+
+Vehicles decide one after the other, and later ones see the target lanes of earlier ones.
+"""
+
+import numpy as np
+from highway_env.vehicle.controller import ControlledVehicle
+
+from envs.fast.compiled import compiled
+from envs.fast.floats import clip, dot, not_zero, wrap_to_pi
+from envs.fast.network import distance, heading_at, is_after_end, is_reachable, local_coordinates, position
+from envs.fast.sight import car_ahead, car_behind
+from envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
+
+LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)  # as in `DiscreteMetaAction.ACTIONS_ALL`
+
+_PURSUIT = ControlledVehicle.TAU_PURSUIT  # [s]
+_KP_ACCELERATION = ControlledVehicle.KP_A  # [1/s]
+_KP_HEADING = ControlledVehicle.KP_HEADING
+_KP_LATERAL = ControlledVehicle.KP_LATERAL
+_MAX_STEERING = ControlledVehicle.MAX_STEERING_ANGLE  # [rad]
+
+
+@compiled
+def decide(cars, episode, net, lanes, sight, idm):
+    """Commands of all vehicles for one frame.
+
+    Args:
+      cars: `[N]` CAR.
+      episode: EPISODE.
+      net, lanes: the network and its LANE records.
+      sight: this frame's, with the cars lined up.
+      idm: IDM record, parameters of the traffic.
+    """
+    n = episode.cars
+    changing = 0
+    for i in range(n):
+        if cars[i].target_lane != cars[i].lane:
+            sight.changing[changing] = i
+            changing += 1
+    for i in range(episode.vehicles):
+        car = cars[i]
+        if car.kind == TRAFFIC:
+            if not car.crashed:
+                settled = car.target_lane == car.lane
+                _drive_in_traffic(cars, i, n, changing, net, lanes, sight, idm)
+                if settled and car.target_lane != car.lane:
+                    sight.changing[changing] = i
+                    changing += 1
+        elif car.kind == META:
+            control(cars, i, net, lanes, sight)
+
+
+# ---------------------------------------------------------------- the controlled vehicle
+
+
+@compiled
+def take_meta_action(cars, i, action, net, lanes, sight, target_speeds):
+    """Change the target speed or lane of the car, as `MDPVehicle.act` does with a label."""
+    car = cars[i]
+    last = len(target_speeds) - 1
+    if action == FASTER or action == SLOWER:
+        change = 1 if action == FASTER else -1
+        car.speed_index = int(clip(speed_to_index(car.speed, target_speeds) + change, 0, last))
+        car.target_speed = target_speeds[car.speed_index]
+    follow_road(cars, i, net, lanes, sight)
+    if action == LANE_LEFT or action == LANE_RIGHT:
+        target = lanes[car.target_lane]
+        step = 1 if action == LANE_RIGHT else -1
+        lane = car.target_lane + int(clip(target.id + step, 0, target.siblings - 1)) - target.id
+        if is_reachable(lanes[lane], sight.s[lane, i], sight.lateral[lane, i]):
+            car.target_lane = lane
+
+
+@compiled
+def speed_to_index(speed, target_speeds):
+    """Index of the target speed nearest to `speed`, the speeds being evenly spaced."""
+    last = len(target_speeds) - 1
+    x = (speed - target_speeds[0]) / (target_speeds[last] - target_speeds[0])
+    return int(clip(np.rint(x * last), 0, last))
+
+
+@compiled
+def control(cars, i, net, lanes, sight):
+    """Follow the target lane at the target speed."""
+    car = cars[i]
+    follow_road(cars, i, net, lanes, sight)
+    car.steering = steer(cars, i, lanes, sight)
+    car.acceleration = _KP_ACCELERATION * (car.target_speed - car.speed)
+
+
+@compiled
+def steer(cars, i, lanes, sight):
+    """Steering angle that leads the car to the middle of its target lane [rad]."""
+    car = cars[i]
+    lane, s, lateral = lanes[car.target_lane], sight.s[car.target_lane, i], sight.lateral[car.target_lane, i]
+    heading = heading_at(lane, s + car.speed * _PURSUIT)
+    if lateral == 0.0 and heading == car.heading:
+        return 0.0
+    speed = not_zero(car.speed)
+    heading += clip(np.arcsin(clip(-_KP_LATERAL * lateral / speed, -1.0, 1.0)), -np.pi / 4, np.pi / 4)
+    rate = _KP_HEADING * wrap_to_pi(heading - car.heading)
+    slip = np.arcsin(clip(car.length / 2 / speed * rate, -1.0, 1.0))
+    return clip(np.arctan(2 * np.tan(slip)), -_MAX_STEERING, _MAX_STEERING)
+
+
+# ---------------------------------------------------------------- routes
+
+
+@compiled
+def follow_road(cars, i, net, lanes, sight):
+    """At the end of the target lane, head for the next one."""
+    car = cars[i]
+    k = car.target_lane
+    if is_after_end(lanes[k], sight.s[k, i]):
+        car.target_lane = _next_lane(car, sight.s[k, i], net, lanes)
+
+
+@compiled
+def route_length(net, route):
+    """Number of steps of a route."""
+    length = 0
+    while length < net.route_roads.shape[1] and net.route_roads[route, length] >= 0:
+        length += 1
+    return length
+
+
+@compiled
+def _next_lane(car, s, net, lanes):
+    """Lane that continues the target lane: along the route, else the nearest one."""
+    k = car.target_lane
+    road = lanes[k].road
+    next_road, next_id = -1, -1
+    if car.route >= 0:
+        length = route_length(net, car.route)
+        if car.route_step < length and net.route_roads[car.route, car.route_step] == road:
+            car.route_step += 1
+        if car.route_step < length:
+            step = net.route_roads[car.route, car.route_step]
+            if net.roads[step].origin == net.roads[road].end:
+                next_road, next_id = step, net.route_lanes[car.route, car.route_step]
+    x, y = position(lanes[k], s, 0.0)
+    if next_road >= 0:
+        lane, _ = _lane_on(next_road, next_id, k, x, y, net, lanes)
+        return lane
+    nearest, best = k, np.inf
+    for m in range(net.next_roads.shape[1]):
+        if net.next_roads[road, m] < 0:
+            break
+        lane, far = _lane_on(net.next_roads[road, m], -1, k, x, y, net, lanes)
+        if far < best:
+            nearest, best = lane, far
+    return nearest
+
+
+@compiled
+def _lane_on(road, lane_id, k, x, y, net, lanes):
+    """Lane of the next road to take from lane `k`, and its distance to a point [m]."""
+    first = net.roads[road].first
+    if net.roads[road].lanes == lanes[k].siblings:
+        lane = first + (lane_id if lane_id >= 0 else lanes[k].id)
+        s, lateral = local_coordinates(lanes[lane], x, y)
+        return lane, distance(lanes[lane], s, lateral)
+    nearest, best = first, np.inf
+    for lane in range(first, first + net.roads[road].lanes):
+        s, lateral = local_coordinates(lanes[lane], x, y)
+        far = distance(lanes[lane], s, lateral)
+        if far < best:
+            nearest, best = lane, far
+    return nearest, best
+
+
+# ---------------------------------------------------------------- traffic: IDM and MOBIL
+
+
+@compiled
+def _drive_in_traffic(cars, i, n, changing, net, lanes, sight, idm):
+    car = cars[i]
+    follow_road(cars, i, net, lanes, sight)
+    if car.changes_lane:
+        _change_lane(cars, i, n, changing, net, lanes, sight, idm)
+    car.steering = steer(cars, i, lanes, sight)
+    ahead = car_ahead(car.lane, i, n, net, lanes, sight)
+    a = idm_acceleration(cars, i, ahead, car.delta, lanes, sight, idm)
+    if car.lane != car.target_lane:
+        ahead = car_ahead(car.target_lane, i, n, net, lanes, sight)
+        a = min(a, idm_acceleration(cars, i, ahead, car.delta, lanes, sight, idm))
+    car.acceleration = clip(a, -idm.acc_max, idm.acc_max)
+
+
+@compiled
+def idm_acceleration(cars, i, ahead, delta, lanes, sight, idm):
+    """Acceleration of car `i` behind car `ahead` by the Intelligent Driver Model [m/s^2].
+
+    Args:
+      i: the follower, -1 = nobody.
+      ahead: the leader, -1 = free road.
+      delta: exponent of whoever asks.
+    """
+    if i < 0 or cars[i].kind == OBSTACLE:
+        return 0.0
+    car = cars[i]
+    target = 0.0 if car.kind == DIRECT else car.target_speed
+    target = clip(target, 0.0, lanes[car.lane].speed_limit)
+    a = idm.comfort_acc_max * (1 - (max(car.speed, 0.0) / abs(not_zero(target))) ** delta)
+    if ahead >= 0:
+        gap = sight.s[car.lane, ahead] - sight.s[car.lane, i]
+        ratio = desired_gap(cars, i, ahead, idm) / not_zero(gap)
+        a -= idm.comfort_acc_max * (ratio * ratio)
+    return a
+
+
+@compiled
+def desired_gap(cars, i, ahead, idm):
+    """Distance that car `i` wants to the car ahead, centre to centre [m]."""
+    car, front = cars[i], cars[ahead]
+    approach = dot(
+        car.speed * car.cos - front.speed * front.cos,
+        car.speed * car.sin - front.speed * front.sin,
+        car.cos,
+        car.sin,
+    )
+    braking = 2 * np.sqrt(-idm.comfort_acc_max * idm.comfort_acc_min)
+    return idm.distance_wanted + car.speed * idm.time_wanted + car.speed * approach / braking
+
+
+@compiled
+def _change_lane(cars, i, n, changing, net, lanes, sight, idm):
+    """Start a lane change, or give one up."""
+    car = cars[i]
+    if car.lane != car.target_lane:
+        if lanes[car.lane].road == lanes[car.target_lane].road:
+            _give_way(cars, i, changing, sight, idm)
+        return
+    if not idm.lane_change_delay < car.timer:
+        return
+    car.timer = 0.0
+    here = car.lane
+    for side in (-1, 1):
+        k = here + side
+        if not 0 <= lanes[here].id + side < lanes[here].siblings:
+            continue
+        if not is_reachable(lanes[k], sight.s[k, i], sight.lateral[k, i]) or abs(car.speed) < 1:
+            continue
+        if _is_change_worthwhile(cars, i, k, n, net, lanes, sight, idm):
+            car.target_lane = k
+
+
+@compiled
+def _give_way(cars, i, changing, sight, idm):
+    """Abort a lane change if somebody close ahead is already changing to the same lane."""
+    car = cars[i]
+    for m in range(changing):
+        j = sight.changing[m]
+        other = cars[j]
+        if j == i or other.lane == car.target_lane or other.target_lane != car.target_lane:
+            continue
+        if other.kind != TRAFFIC and other.kind != META:
+            continue
+        gap = sight.s[car.lane, j] - sight.s[car.lane, i]
+        if 0 < gap < desired_gap(cars, i, j, idm):
+            car.target_lane = car.lane
+            return
+
+
+@compiled
+def _is_change_worthwhile(cars, i, k, n, net, lanes, sight, idm):
+    """MOBIL for drivers without politeness: does a change to lane `k` help, and harm nobody?"""
+    car = cars[i]
+    ahead = car_ahead(k, i, n, net, lanes, sight)
+    behind = car_behind(k, i, n, net, lanes, sight)
+    if idm_acceleration(cars, behind, i, car.delta, lanes, sight, idm) < -idm.max_braking_imposed:
+        return False
+    a = idm_acceleration(cars, i, ahead, car.delta, lanes, sight, idm)
+    if car.route >= 0 and car.route_step < route_length(net, car.route):
+        lane_id = net.route_lanes[car.route, car.route_step]
+        if lane_id >= 0:
+            here = lanes[car.target_lane].id
+            return np.sign(lanes[k].id - here) == np.sign(lane_id - here) and a >= -idm.max_braking_imposed
+    ahead = car_ahead(car.lane, i, n, net, lanes, sight)
+    return a - idm_acceleration(cars, i, ahead, car.delta, lanes, sight, idm) >= idm.min_acc_gain

@@ -1,0 +1,352 @@
+"""The engine: batches of environments, one compiled kernel, Python threads.
+
+The kernel advances a range of environments and releases the interpreter lock, so threads each take a
+share of the batch. Environments do not see each other: results do not depend on the shares.
+"""
+
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from threading import Timer
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from envs.fast.compiled import fingerprint
+from envs.fast.collisions import collide
+from envs.fast.config import Scenario
+from envs.fast.draws import load_generator
+from envs.fast.drivers import decide, take_meta_action
+from envs.fast.guard import (
+    MONITOR,
+    OFF,
+    OVERRIDE,
+    Frames,
+    check_contact,
+    compile_frames,
+    is_at_fault,
+    make_watch,
+    no_frames,
+    start_tally,
+    start_watch,
+    watch_frame,
+)
+from envs.fast.motion import move
+from envs.fast.network import Network
+from envs.fast.observations import observe
+from envs.fast.rewards import is_terminated, is_truncated, rate
+from envs.fast.scenes import make_scene
+from envs.fast.sight import line_up, make_sight, project, sort_along_x, update_lanes
+from envs.fast.state import CAR, EPISODE, STEP
+from envs.highway import Settings
+from shield.params import PRESETS, Rules
+from shield.response import MEMORY
+
+DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
+DECIDE, RESTART, STAY = range(3)  # what an environment does on a call
+_LONGEST_TTC = 100.0  # [s]
+_PATIENCE = 6.0  # seconds of silence before the first call explains itself
+
+
+class World(NamedTuple):
+    """What does not change."""
+
+    config: np.ndarray  # `[1]` CONFIG
+    network: Network
+    frames: Frames
+    # the rest is as in `Scenario`
+    target_speeds: np.ndarray
+    labels: np.ndarray
+    features: np.ndarray
+    ranges: np.ndarray
+    connected: np.ndarray
+    lane_odds: np.ndarray
+
+
+class Batch(NamedTuple):
+    """State of E environments with room for N road users."""
+
+    cars: np.ndarray  # `[E, N]` CAR
+    episodes: np.ndarray  # `[E]` EPISODE
+    order: np.ndarray  # `[E, N]` indices sorted by x
+    memory: np.ndarray  # `[E, N]` MEMORY of the shield, `[E, 0]` without one
+    before: np.ndarray  # `[E, N, 2]` positions one frame ago, for the shield
+
+
+class Inputs(NamedTuple):
+    """What the agents want. Only one of the two kinds of command counts."""
+
+    actions: np.ndarray  # `[E]` discrete actions
+    commands: np.ndarray  # `[E, 2]` acceleration [m/s^2] and steering [rad]
+    todo: np.ndarray  # `[E]` DECIDE, RESTART or STAY
+
+
+class Outputs(NamedTuple):
+    """What came of it."""
+
+    observations: np.ndarray  # `[E, size]` float32, of the new episode where one began
+    rewards: np.ndarray  # `[E]`
+    terminated: np.ndarray  # `[E]`
+    truncated: np.ndarray  # `[E]`
+    steps: np.ndarray  # `[E]` STEP, of the new episode where one began
+    final_observations: np.ndarray  # `[E, size]` written where an episode ended and another began
+    final_steps: np.ndarray  # `[E]` STEP, likewise
+
+
+class Film(NamedTuple):
+    """The frames of the last decision, of chosen environments."""
+
+    slots: np.ndarray  # `[E]` row of each environment, -1 = not filmed
+    cars: np.ndarray  # `[slots, frames, N]` CAR after each frame
+
+
+@njit
+def _restart(cars, episode, order, memory, before, world, sight, mode, step, out):
+    """Begin a new episode and observe it."""
+    config, lanes = world.config[0], world.network.lanes
+    make_scene(cars, episode, order, world.network, lanes, config, world.target_speeds, world.lane_odds)
+    episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
+    project(cars, episode.cars, lanes, sight)
+    sort_along_x(cars, episode.cars, order)
+    start_watch(episode, memory, before)
+    start_tally(step)
+    rate(cars, episode, -1, lanes, sight, config, step)
+    step.raw_reward = 0.0
+    _report(cars, episode, mode, 0.0, step)
+    _see(cars, episode, world, sight, out)
+
+
+@njit
+def _see(cars, episode, world, sight, out):
+    observe(
+        cars,
+        episode,
+        world.network.lanes,
+        sight,
+        world.config[0],
+        world.features,
+        world.ranges,
+        world.connected,
+        world.target_speeds,
+        out,
+    )
+
+
+@njit
+def _report(cars, episode, mode, cost, step):
+    """Fill in what every step says."""
+    ego = cars[episode.ego]
+    step.speed, step.crashed = ego.speed, ego.crashed
+    step.episode_return, step.episode_length = episode.return_, episode.steps
+    if mode != OFF:
+        episode.cost += cost
+        step.cost, step.episode_cost = cost, episode.cost
+        step.override_share = episode.frames_overridden / max(episode.frames, 1)
+        step.min_ttc = min(episode.min_ttc, _LONGEST_TTC)
+        step.blame, step.blame_partner = episode.blame, episode.blame_partner
+        step.blame_axes, step.blame_frames = episode.blame_axes, episode.blame_frames
+        step.ego_duty, step.ego_excess = episode.ego_duty, episode.ego_excess
+        step.other_duty, step.other_excess = episode.other_duty, episode.other_excess
+
+
+@njit
+def _advance(e, cars, episode, order, memory, before, world, sight, watch, settings, mode, inputs, film, step):
+    """One decision of one environment, frame by frame."""
+    config, net = world.config[0], world.network
+    lanes = net.lanes
+    ego = cars[episode.ego]
+    project(cars, episode.cars, lanes, sight)
+    start_tally(step)
+    had_contact = episode.blame != 0
+    for frame in range(config.frames):
+        if frame == 0:
+            if config.meta_actions:
+                take_meta_action(cars, episode.ego, world.labels[inputs.actions[e]], net, lanes, sight, world.target_speeds)
+            else:
+                ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
+                episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
+        line_up(episode.cars, lanes, order, sight)
+        decide(cars, episode, net, lanes, sight, config)
+        if mode != OFF:
+            watch_frame(cars, episode, memory, before, lanes, sight, world.frames, watch, settings, step)
+        move(cars, episode.vehicles, config.dt, config.max_speed, config.min_speed)
+        project(cars, episode.cars, lanes, sight)
+        update_lanes(cars, episode.vehicles, lanes, sight)
+        sort_along_x(cars, episode.cars, order)
+        collide(cars, episode, order, sight, config.dt)
+        if film.slots[e] >= 0:
+            film.cars[film.slots[e], frame] = cars
+    episode.time += config.period
+    episode.steps += 1
+    cost = 0.0
+    if mode != OFF:
+        check_contact(cars, episode, memory, before, lanes, sight, world.frames, watch, settings)
+        if step.broken_duties > 0 or (not had_contact and is_at_fault(episode.blame)):
+            cost = 1.0
+    return cost
+
+
+def _make_kernel(version: int):
+    """The one compiled entry point; `version` makes numba's cache notice changes elsewhere."""
+
+    @njit(cache=True, nogil=True)
+    def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalty, autoreset):
+        """One decision of the environments `first` to `last` - 1, resets included."""
+        if version < 0:
+            return
+        config, lanes = world.config[0], world.network.lanes
+        n = batch.cars.shape[1]
+        sight = make_sight(len(lanes), n, config.speeds, config.lanes, config.times)
+        watch = make_watch(n)
+        for e in range(first, last):
+            cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
+            memory, before, observation = batch.memory[e], batch.before[e], outputs.observations[e]
+            outputs.rewards[e] = 0.0
+            outputs.terminated[e] = outputs.truncated[e] = False
+            if inputs.todo[e] == STAY:
+                project(cars, episode.cars, lanes, sight)
+                _see(cars, episode, world, sight, observation)
+                _report(cars, episode, mode, 0.0, step)
+                continue
+            if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
+                _restart(cars, episode, order, memory, before, world, sight, mode, step, observation)
+                continue
+            cost = _advance(
+                e, cars, episode, order, memory, before, world, sight, watch, settings, mode, inputs, film, step
+            )
+            _see(cars, episode, world, sight, observation)
+            reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
+            step.raw_reward = reward
+            reward -= penalty * step.overridden / max(step.frames, 1)
+            episode.return_ += reward
+            outputs.rewards[e] = reward
+            outputs.terminated[e] = is_terminated(cars, episode, lanes, sight, config)
+            outputs.truncated[e] = is_truncated(episode, config)
+            episode.ended = outputs.terminated[e] or outputs.truncated[e]
+            _report(cars, episode, mode, cost, step)
+            if episode.ended and autoreset == SAME_STEP:
+                outputs.final_observations[e] = observation
+                outputs.final_steps[e] = step
+                _restart(cars, episode, order, memory, before, world, sight, mode, step, observation)
+
+    return run
+
+
+_run = _make_kernel(fingerprint())
+
+class Engine:
+    """E environments in lockstep, as arrays.
+
+    Args:
+      scenario: what to run.
+      num_envs: E.
+      settings: `envs.highway.Settings` of the shield, None = no shield.
+      penalty: subtracted from the reward, times the share of frames that the shield overrode.
+      autoreset: DISABLED, SAME_STEP or NEXT_STEP.
+      threads: how many threads share the work.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        num_envs: int,
+        settings: Settings | None = None,
+        penalty: float = 0.0,
+        autoreset: int = SAME_STEP,
+        threads: int = 1,
+    ) -> None:
+        n = scenario.capacity
+        self.scenario = scenario
+        self.num_envs = num_envs
+        self.autoreset = autoreset
+        self.mode = OFF if settings is None else OVERRIDE if settings.overrides else MONITOR
+        self.penalty = float(penalty)
+        self.settings = settings or Settings(*PRESETS["simulator"][:2], Rules(), False, 1.0)
+        watched = n if settings else 0
+        self.world = World(
+            scenario.config,
+            scenario.network,
+            compile_frames(scenario.stock.road.network) if settings else no_frames(),
+            scenario.target_speeds,
+            scenario.labels,
+            scenario.features,
+            scenario.ranges,
+            scenario.connected,
+            scenario.lane_odds,
+        )
+        self.batch = Batch(
+            np.zeros((num_envs, n), CAR),
+            np.zeros(num_envs, EPISODE),
+            np.zeros((num_envs, n), np.int32),
+            np.zeros((num_envs, watched), MEMORY),
+            np.zeros((num_envs, watched, 2)),
+        )
+        self.film = Film(np.full(num_envs, -1, np.int32), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
+        self._size = int(np.prod(scenario.observation_space.shape))
+        self._shares = np.linspace(0, num_envs, threads + 1).astype(int)
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+
+    def seed(self, seeds) -> None:
+        """Give environments the generators that highway-env would have.
+
+        Args:
+          seeds: `[E]` integers; None leaves a generator as it is.
+        """
+        for e, seed in enumerate(seeds):
+            if seed is not None:
+                load_generator(self.batch.episodes[e], np.random.PCG64(np.random.SeedSequence(seed)))
+
+    def reset(self, mask=None) -> Outputs:
+        """Begin new episodes, in all environments or where `mask` `[E]` says so; the others stand still."""
+        e = self.num_envs
+        todo = np.full(e, RESTART, np.int8) if mask is None else np.where(mask, RESTART, STAY).astype(np.int8)
+        return self._run(Inputs(np.zeros(e, np.int32), np.zeros((e, 2)), todo))
+
+    def step(self, actions=None, commands=None) -> Outputs:
+        """One decision everywhere.
+
+        Args:
+          actions: `[E]` int32 discrete actions, or
+          commands: `[E, 2]` acceleration [m/s^2] and steering [rad].
+        """
+        e = self.num_envs
+        actions = np.full(e, -1, np.int32) if actions is None else actions
+        commands = np.zeros((e, 2)) if commands is None else commands
+        return self._run(Inputs(actions, commands, np.full(e, DECIDE, np.int8)))
+
+    def _run(self, inputs: Inputs) -> Outputs:
+        e = self.num_envs
+        outputs = Outputs(
+            np.empty((e, self._size), np.float32),
+            np.empty(e),
+            np.empty(e, bool),
+            np.empty(e, bool),
+            np.zeros(e, STEP),
+            np.zeros((e, self._size), np.float32),
+            np.zeros(e, STEP),
+        )
+        common = (self.world, self.batch, inputs, outputs, self.film, self.settings, self.mode, self.penalty, self.autoreset)
+        if not _run.signatures:
+            _warm_up(common)
+        if self._pool is None:
+            _run(0, e, *common)
+        else:
+            ranges = zip(self._shares[:-1], self._shares[1:], strict=True)
+            for done in [self._pool.submit(_run, first, last, *common) for first, last in ranges]:
+                done.result()
+        return outputs
+
+    def close(self) -> None:
+        """Give the threads back."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+
+def _warm_up(arguments) -> None:
+    """Compile the kernel, or load it from numba's cache; says so if that takes long."""
+    notice = Timer(
+        _PATIENCE, lambda: print("compiling the fast engine; numba keeps the result for later runs", file=sys.stderr)
+    )
+    notice.start()
+    _run(0, 0, *arguments)
+    notice.cancel()

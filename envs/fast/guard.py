@@ -1,0 +1,275 @@
+"""The shield inside the frame loop: `envs.highway.ShieldedEgo` on the engine's arrays.
+
+The formulas are those of `shield/`; here is only what reads the engine's cars, keeps the tally of a
+decision and writes the command back.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from envs.fast.collisions import is_near, overlap
+from envs.fast.floats import norm
+from envs.fast.network import heading_at
+from envs.fast.state import DIRECT, OBSTACLE
+from envs.highway import _same_frame, _to_lane_frame, road_through
+from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
+from shield.controller import Body, Command, shield_frame
+from shield.geometry import PIECE_FIELDS
+from shield.pair import ROAD_USER
+from shield.response import MEMORY
+
+OFF, MONITOR, OVERRIDE = range(3)
+
+
+class Frames(NamedTuple):
+    """Lane frames in which the shield measures. L lanes."""
+
+    pieces: np.ndarray  # `[P, 7]` pieces of the roads through all lanes
+    start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
+    same: np.ndarray  # `[L, L]` no gap jumps between the two frames
+
+
+class Watch(NamedTuple):
+    """Working memory of the shield for N road users, the ego last."""
+
+    poses: np.ndarray  # `[N, 4]` x, y, heading, speed
+    sizes: np.ndarray  # `[N, 3]` length, width, is it a vehicle
+    wrecks: np.ndarray  # `[N]`
+    own_lane: np.ndarray  # `[N]` does it drive inside a lane that runs its way
+    users: np.ndarray  # `[N]` ROAD_USER
+
+
+def compile_frames(network) -> Frames:
+    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`."""
+    roads = [road_through(network, index) for index in network.lanes_dict()]
+    return Frames(
+        np.concatenate(roads),
+        np.cumsum([0, *map(len, roads)]),
+        np.array([[_same_frame(a, b) for b in roads] for a in roads]),
+    )
+
+
+def no_frames() -> Frames:
+    """Stands in where no shield runs."""
+    return Frames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), np.zeros((0, 0), bool))
+
+
+@njit
+def make_watch(n):
+    """Fresh working memory."""
+    return Watch(
+        np.empty((n, 4)), np.empty((n, 3)), np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty(n, ROAD_USER)
+    )
+
+
+@njit
+def start_watch(episode, memory, before):
+    """Forget everything at the start of an episode."""
+    memory[:] = np.zeros(1, MEMORY)[0]
+    before[:] = np.nan
+    episode.frame_lane = -1
+    episode.nominal_acceleration = episode.nominal_steering = 0.0
+    episode.frames = episode.frames_overridden = 0
+    episode.cost = 0.0
+    episode.min_ttc = np.inf
+    episode.blame = episode.blame_axes = episode.blame_frames = episode.ego_duty = episode.other_duty = 0
+    episode.blame_partner = -1
+    episode.ego_excess = episode.other_excess = 0.0
+
+
+@njit
+def start_tally(step):
+    """Nothing has happened in this decision yet."""
+    step.frames = step.overridden = step.limited = step.dangerous_pairs = step.broken_duties = 0
+    step.acceleration_change = step.steering_change = 0.0
+    step.margin_lon = step.margin_lat = np.inf
+    step.partner, step.response = -1, 0
+
+
+@njit
+def watch_frame(cars, episode, memory, before, lanes, sight, frames, watch, settings, step):
+    """Restrict the ego's command on one frame, unless it has had its contact.
+
+    Args:
+      cars: `[N]` CAR, all commands chosen.
+      episode: EPISODE.
+      memory: `[N]` MEMORY of the other road users.
+      before: `[N, 2]` last positions in the order of `Watch`, nan at first sight.
+      lanes: `[L]` LANE.
+      sight: this frame's.
+      frames: `Frames` of the network.
+      watch: working memory.
+      settings: `envs.highway.Settings`.
+      step: STEP, the tally is kept there.
+    """
+    if check_contact(cars, episode, memory, before, lanes, sight, frames, watch, settings):
+        return
+    car = cars[episode.ego]
+    if car.kind == DIRECT:
+        acceleration, steering = episode.nominal_acceleration, episode.nominal_steering
+    else:
+        acceleration, steering = car.acceleration, car.steering
+    curvature = _sense(cars, episode, memory, before, lanes, sight, frames, watch, settings)
+    n = episode.cars - 1
+    ego, users = watch.users[n], watch.users[:n]
+    wish = Command(acceleration, np.arctan(0.5 * np.tan(steering)))
+    max_slip = np.arctan(np.tan(np.pi / 3) / 2)
+    report = shield_frame(
+        ego,
+        users,
+        memory,
+        wish,
+        Body(car.length / 2, max_slip, curvature),
+        settings.ego,
+        settings.other,
+        settings.rules,
+        settings.dt,
+    )
+    command = report.command if settings.overrides else wish
+    pairs, broken = judge_frame(
+        ego, users, memory, command, curvature, settings.ego, settings.other, settings.dt
+    )
+    steered = steering
+    if command.slip != wish.slip:
+        steered = np.arctan(2.0 * np.tan(command.slip))
+    if settings.overrides:
+        car.acceleration, car.steering = command.acceleration, steered
+
+    step.frames += 1
+    step.overridden += report.overridden and settings.overrides
+    step.limited += report.limited and settings.overrides
+    step.dangerous_pairs += pairs
+    step.broken_duties += broken
+    step.acceleration_change = max(step.acceleration_change, abs(command.acceleration - acceleration))
+    step.steering_change = max(step.steering_change, abs(steered - steering))
+    if max(report.margin_lon, report.margin_lat) < max(step.margin_lon, step.margin_lat):
+        step.margin_lon, step.margin_lat = report.margin_lon, report.margin_lat
+        step.partner = _car_of(report.partner, episode)
+    step.response |= report.response
+    episode.frames += 1
+    episode.frames_overridden += report.overridden and settings.overrides
+    episode.min_ttc = min(episode.min_ttc, report.ttc)
+
+
+@njit
+def _car_of(user, episode):
+    """Index among the cars of an index among the others."""
+    return user if user < episode.ego else user + 1
+
+
+@njit
+def _sense(cars, episode, memory, before, lanes, sight, frames, watch, settings):
+    """Fill `watch.users` with everybody in the ego's lane frame, the ego last; returns the lane's curvature."""
+    n, ego = episode.cars, cars[episode.ego]
+    if ego.lane != episode.frame_lane:
+        if episode.frame_lane >= 0 and not frames.same[episode.frame_lane, ego.lane]:
+            for i in range(n - 1):
+                if memory[i].since == 0:
+                    memory[i] = np.zeros(1, MEMORY)[0]
+        episode.frame_lane = ego.lane
+    road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
+    for i in range(n):
+        k = episode.ego if i == n - 1 else _car_of(i, episode)
+        car = cars[k]
+        watch.poses[i, 0], watch.poses[i, 1] = car.x, car.y
+        watch.poses[i, 2], watch.poses[i, 3] = car.heading, car.speed
+        vehicle = car.kind != OBSTACLE
+        watch.sizes[i, 0], watch.sizes[i, 1], watch.sizes[i, 2] = car.length, car.width, 1.0 if vehicle else 0.0
+        watch.wrecks[i] = car.crashed or not vehicle
+        watch.own_lane[i] = _in_own_lane(k, car, ego, lanes, sight)
+    curvature = _to_lane_frame(
+        road,
+        watch.poses[:n],
+        before[:n],
+        watch.sizes[:n],
+        watch.wrecks[:n],
+        watch.own_lane[:n],
+        settings.rules.heading_bound,
+        settings.dt,
+        watch.users[:n],
+    )
+    before[:n] = watch.poses[:n, :2]
+    return curvature
+
+
+@njit
+def _in_own_lane(k, car, ego, lanes, sight):
+    """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
+    if np.cos(car.heading - ego.heading) > 0.0:
+        return True
+    lane, s, lateral = lanes[car.lane], sight.s[car.lane, k], sight.lateral[car.lane, k]
+    along = np.cos(car.heading - heading_at(lane, s)) > 0.0
+    return along and abs(lateral) <= (lane.width - car.width) / 2
+
+
+@njit
+def check_contact(cars, episode, memory, before, lanes, sight, frames, watch, settings):
+    """Has the ego touched somebody, or is it about to? Judged at the first such sample."""
+    ego = cars[episode.ego]
+    if episode.blame == 0 and (ego.crashed or ego.hit):
+        _judge(cars, episode, memory, before, lanes, sight, frames, watch, settings)
+    return episode.blame != 0
+
+
+@njit
+def _judge(cars, episode, memory, before, lanes, sight, frames, watch, settings):
+    _sense(cars, episode, memory, before, lanes, sight, frames, watch, settings)
+    n = episode.cars - 1
+    ego = watch.users[n]
+    heaviest, touched = -1, False
+    for i in range(n):
+        touched |= _touches(cars, _car_of(i, episode), episode.ego, sight, settings.dt)
+    nearest = _nearest(cars, episode) if not touched else -1
+    for i in range(n):
+        k = _car_of(i, episode)
+        if not (_touches(cars, k, episode.ego, sight, settings.dt) if touched else k == nearest):
+            continue
+        verdict = judge_contact(
+            ego, watch.users[i], memory[i], settings.ego, settings.other, settings.rules, settings.dt
+        )
+        weight = _weight(verdict.verdict)
+        if weight > heaviest:
+            heaviest = weight
+            episode.blame, episode.blame_partner = 1 + verdict.verdict, k
+            episode.blame_axes, episode.blame_frames = verdict.axes, verdict.frames
+            episode.ego_duty, episode.ego_excess = verdict.ego_duty, verdict.ego_excess
+            episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
+
+
+@njit
+def _weight(verdict):
+    """Of several contacts at once, the one that weighs most against the ego counts."""
+    if verdict == NOBODY:
+        return 4
+    if verdict == EGO:
+        return 3
+    if verdict == BOTH:
+        return 2
+    return 1 if verdict == OTHER else 0
+
+
+@njit
+def _touches(cars, k, ego, sight, dt):
+    first, second = cars[min(k, ego)], cars[max(k, ego)]
+    if not (first.checks or second.checks) or not is_near(first, second, dt):
+        return False
+    touches, will_touch, _, _ = overlap(first, second, sight.corners, dt)
+    return touches or will_touch
+
+
+@njit
+def _nearest(cars, episode):
+    ego, nearest, best = cars[episode.ego], -1, np.inf
+    for k in range(episode.cars):
+        far = norm(cars[k].x - ego.x, cars[k].y - ego.y)
+        if k != episode.ego and far < best:
+            nearest, best = k, far
+    return nearest
+
+
+@njit
+def is_at_fault(blame):
+    """Does a blame code charge the ego?"""
+    return blame == 1 + EGO or blame == 1 + BOTH

@@ -1,0 +1,86 @@
+"""What an environment says about a step, as arrays: the same keys and meanings as `ShieldWrapper`.
+
+Arrays of numbers are views of the engine's records; nothing is computed for an environment that
+nobody asks about.
+"""
+
+import numpy as np
+
+from envs.fast.config import EXIT, Scenario
+from envs.highway import AXES, Settings, response_name
+from shield.blame import DUTIES, VERDICTS
+
+_BLAMES = np.array(["", *VERDICTS])
+_DUTIES = np.array(DUTIES)
+_RESPONSES = np.array([response_name(sum_of_bits) for sum_of_bits in range(8)])
+_AXES = np.array([AXES[axes] for axes in range(len(AXES))])
+
+
+def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None) -> dict:
+    """Infos of a batch.
+
+    Args:
+      steps: `[E]` STEP.
+      scenario: what was run.
+      settings: of the shield, None = no shield.
+
+    Returns:
+      Dictionary of arrays `[E]`: `speed`, `crashed`, `rewards` (one array per component) and, with
+      a shield, what `ShieldWrapper` documents. `blame_evidence` counts where `blame` is not "".
+    """
+    infos = {
+        "speed": steps["speed"],
+        "crashed": steps["crashed"],
+        "rewards": {name: steps[f"reward_{k}"] for k, name in enumerate(scenario.reward_names)},
+    }
+    if scenario.config["scenario"][0] == EXIT:
+        infos["is_success"] = steps["success"]
+    if settings is not None:
+        infos |= _shield_infos(steps, settings)
+    return infos
+
+
+def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
+    frames = np.maximum(steps["frames"], 1)
+    return {
+        "shield": {
+            "intervened": steps["overridden"] > 0,
+            "override_fraction": steps["overridden"] / frames,
+            "limited_fraction": steps["limited"] / frames,
+            "acceleration_change": steps["acceleration_change"],
+            "steering_change": steps["steering_change"],
+            "dangerous": steps["dangerous_pairs"] > 0,
+            "dangerous_pairs": steps["dangerous_pairs"],
+            "broken_duties": steps["broken_duties"],
+            "min_margin_lon": steps["margin_lon"],
+            "min_margin_lat": steps["margin_lat"],
+            "partner": steps["partner"],
+            "response": _RESPONSES[steps["response"]],
+        },
+        "cost": steps["cost"],
+        "blame": _BLAMES[steps["blame"]],
+        "blame_evidence": {
+            "verdict": _BLAMES[steps["blame"]],
+            "partner": steps["blame_partner"],
+            "danger": _AXES[steps["blame_axes"]],
+            "seconds_since_threshold": steps["blame_frames"] * settings.dt,
+            "ego_duty": _DUTIES[steps["ego_duty"]],
+            "ego_excess": steps["ego_excess"],
+            "other_duty": _DUTIES[steps["other_duty"]],
+            "other_excess": steps["other_excess"],
+        },
+        "override_share": steps["override_share"],
+        "episode_cost": steps["episode_cost"],
+        "min_ttc": steps["min_ttc"],
+        "raw_reward": steps["raw_reward"],
+    }
+
+
+def info_of(infos: dict, e: int) -> dict:
+    """Infos of one environment out of those of a batch, as plain Python values."""
+    info = {
+        key: info_of(values, e) if isinstance(values, dict) else values[e].item() for key, values in infos.items()
+    }
+    if info.get("blame") == "":
+        info["blame_evidence"] = {}
+    return info

@@ -1,0 +1,246 @@
+"""A highway-env road network as arrays, and the coordinates along its lanes.
+
+Lanes stand in the order in which highway-env walks through its dictionary: ties in its searches are
+decided by that order.
+"""
+
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+from highway_env.road.lane import CircularLane, SineLane, StraightLane
+from highway_env.vehicle.controller import ControlledVehicle
+
+from envs.fast.compiled import compiled
+from envs.fast.floats import dot, norm, wrap_to_pi
+
+STRAIGHT, SINE, CIRCULAR = range(3)
+CAR_LENGTH = 5.0  # `AbstractLane.VEHICLE_LENGTH` [m]
+
+LANE = np.dtype(
+    [
+        ("kind", "i4"),  # STRAIGHT, SINE or CIRCULAR
+        ("road", "i4"),  # index of the road it belongs to
+        ("id", "i4"),  # index within that road, counted to the right
+        ("siblings", "i4"),  # lanes of that road, itself included
+        ("priority", "i4"),
+        ("forbidden", "?"),  # nobody changes to it
+        ("x", "f8"),  # start, or centre of the circle [m]
+        ("y", "f8"),
+        ("dx", "f8"),  # unit vector along it
+        ("dy", "f8"),
+        ("lx", "f8"),  # unit vector to its right
+        ("ly", "f8"),
+        ("heading", "f8"),  # [rad]
+        ("length", "f8"),  # [m]
+        ("width", "f8"),  # [m]
+        ("speed_limit", "f8"),  # [m/s], inf = none
+        ("amplitude", "f8"),  # of a sine [m]
+        ("pulsation", "f8"),  # [rad/m]
+        ("phase", "f8"),  # [rad]
+        ("radius", "f8"),  # of a circle [m]
+        ("start_phase", "f8"),  # [rad]
+        ("turn", "f8"),  # +1 clockwise, -1 counter-clockwise
+    ],
+    align=True,
+)
+
+ROAD = np.dtype(
+    [
+        ("first", "i4"),  # its leftmost lane
+        ("lanes", "i4"),
+        ("origin", "i4"),  # node where it starts
+        ("end", "i4"),  # node where it ends
+    ],
+    align=True,
+)
+
+
+class Network(NamedTuple):
+    """Everything about the roads that compiled code asks for. R roads, L lanes; -1 pads rows."""
+
+    lanes: np.ndarray  # `[L]` LANE
+    roads: np.ndarray  # `[R]` ROAD
+    next_roads: np.ndarray  # `[R, *]` roads that start where this one ends
+    links: np.ndarray  # `[L, *]` lanes searched for neighbours of a car on this lane, itself first
+    link_offsets: np.ndarray  # `[L, *]` what their arc lengths count from on this lane [m]
+    route_roads: np.ndarray  # `[P, *]` roads of each planned route
+    route_lanes: np.ndarray  # `[P, *]` lane id on each, -1 = any
+    plans: np.ndarray  # `[L, D]` route from a lane to each of the destinations
+
+
+def compile_network(network, connected: bool, destinations: tuple[str, ...] = ()) -> Network:
+    """Arrays of a `highway_env.road.road.RoadNetwork`.
+
+    Args:
+      network: the road network.
+      connected: neighbours are searched on connected lanes too.
+      destinations: nodes that cars plan their routes to.
+
+    Raises:
+      ValueError: a kind of lane that is not supported.
+    """
+    ways = [(origin, end) for origin, ends in network.graph.items() for end in ends]
+    nodes: dict[str, int] = {}
+    for way in ways:
+        for node in way:
+            nodes.setdefault(node, len(nodes))
+    roads = np.zeros(len(ways), ROAD)
+    indices = list(network.lanes_dict())
+    number = {index: i for i, index in enumerate(indices)}
+    for r, (origin, end) in enumerate(ways):
+        lanes = network.graph[origin][end]
+        roads[r] = (number[origin, end, 0], len(lanes), nodes[origin], nodes[end])
+    lanes = np.concatenate([_lane(network.get_lane(index), ways.index(index[:2]), index) for index in indices])
+    lanes["siblings"] = roads["lanes"][lanes["road"]]
+
+    next_roads = [[r for r, way in enumerate(ways) if way[0] == end] for _, end in ways]
+    links, offsets = zip(*(_links(network, index, number, connected) for index in indices), strict=True)
+    route_roads: list[list[int]] = []
+    route_lanes: list[list[int]] = []
+    plans = np.zeros((len(indices), len(destinations)), np.int32)
+    for i, index in enumerate(indices):
+        for d, destination in enumerate(destinations):
+            plans[i, d] = len(route_roads)
+            route = _plan(network, index, destination)
+            route_roads.append([ways.index(step[:2]) for step in route])
+            route_lanes.append([-1 if step[2] is None else step[2] for step in route])
+    return Network(
+        lanes,
+        roads,
+        _padded(next_roads, np.int32, -1),
+        _padded(links, np.int32, -1),
+        _padded(offsets, np.float64, 0.0),
+        _padded(route_roads, np.int32, -1),
+        _padded(route_lanes, np.int32, -1),
+        plans,
+    )
+
+
+def _lane(lane, road: int, index) -> np.ndarray:
+    row = np.zeros(1, LANE)
+    row["road"], row["id"] = road, index[2]
+    row["forbidden"], row["priority"] = lane.forbidden, lane.priority
+    row["length"], row["width"] = lane.length, lane.width_at(0.0)
+    row["speed_limit"] = np.inf if lane.speed_limit is None else lane.speed_limit
+    if isinstance(lane, StraightLane):
+        row["kind"] = STRAIGHT
+        (row["x"], row["y"]), (row["dx"], row["dy"]) = lane.start, lane.direction
+        (row["lx"], row["ly"]), row["heading"] = lane.direction_lateral, lane.heading
+        if isinstance(lane, SineLane):
+            row["kind"] = SINE
+            row["amplitude"], row["pulsation"], row["phase"] = lane.amplitude, lane.pulsation, lane.phase
+    elif isinstance(lane, CircularLane):
+        row["kind"] = CIRCULAR
+        (row["x"], row["y"]), row["radius"] = lane.center, lane.radius
+        row["start_phase"], row["turn"] = lane.start_phase, lane.direction
+    else:
+        raise ValueError(f"lane {index} is a {type(lane).__name__}; expected StraightLane, SineLane or CircularLane")
+    return row
+
+
+def _links(network, index, number, connected: bool):
+    """Lanes on which `Road.neighbour_vehicles` looks around a lane, in its order, with their offsets."""
+    lane = network.get_lane(index)
+    found, offsets = [number[index]], [0.0]
+    if connected:
+        origin, end, i = index
+        for following, lanes in network.graph.get(end, {}).items():
+            found.append(number[end, following, i if i < len(lanes) else 0])
+            offsets.append(lane.length)
+        for before, ends in network.graph.items():
+            if origin in ends:
+                previous = (before, origin, i if i < len(ends[origin]) else 0)
+                found.append(number[previous])
+                offsets.append(-network.get_lane(previous).length)
+    return found, offsets
+
+
+def _plan(network, index, destination: str):
+    """The route that a car on lane `index` plans."""
+    car = SimpleNamespace(road=SimpleNamespace(network=network), lane_index=index, route=None)
+    return ControlledVehicle.plan_route_to(car, destination).route
+
+
+def _padded(rows, dtype, filler) -> np.ndarray:
+    table = np.full((len(rows), max([1, *map(len, rows)])), filler, dtype)
+    for i, row in enumerate(rows):
+        table[i, : len(row)] = row
+    return table
+
+
+# ---------------------------------------------------------------- coordinates
+
+
+@compiled
+def local_coordinates(lane, x, y):
+    """Arc length and signed lateral offset of a point on a lane [m]."""
+    dx, dy = x - lane.x, y - lane.y
+    if lane.kind == CIRCULAR:
+        phi = wrap_to_pi(np.arctan2(dy, dx) - lane.start_phase) + lane.start_phase
+        return lane.turn * (phi - lane.start_phase) * lane.radius, lane.turn * (lane.radius - norm(dx, dy))
+    s = dot(dx, dy, lane.dx, lane.dy)
+    lateral = dot(dx, dy, lane.lx, lane.ly)
+    if lane.kind == SINE:
+        lateral -= lane.amplitude * np.sin(lane.pulsation * s + lane.phase)
+    return s, lateral
+
+
+@compiled
+def position(lane, s, lateral):
+    """World position of a point given in lane coordinates [m]."""
+    if lane.kind == CIRCULAR:
+        phi = lane.turn * s / lane.radius + lane.start_phase
+        radius = lane.radius - lateral * lane.turn
+        return lane.x + radius * np.cos(phi), lane.y + radius * np.sin(phi)
+    if lane.kind == SINE:
+        lateral += lane.amplitude * np.sin(lane.pulsation * s + lane.phase)
+    return lane.x + s * lane.dx + lateral * lane.lx, lane.y + s * lane.dy + lateral * lane.ly
+
+
+@compiled
+def heading_at(lane, s):
+    """Heading of a lane at arc length `s` [rad]."""
+    if lane.kind == STRAIGHT:
+        return lane.heading
+    if lane.kind == SINE:
+        slope = lane.amplitude * lane.pulsation * np.cos(lane.pulsation * s + lane.phase)
+        return lane.heading + np.arctan(slope)
+    return lane.turn * s / lane.radius + lane.start_phase + np.pi / 2 * lane.turn
+
+
+@compiled
+def distance(lane, s, lateral):
+    """L1 distance of a point in lane coordinates to the lane [m]."""
+    return abs(lateral) + max(s - lane.length, 0.0) + max(0.0 - s, 0.0)
+
+
+@compiled
+def is_on_lane(lane, s, lateral, margin):
+    """Is a point in lane coordinates on the lane, or nearer to it than `margin` [m]?"""
+    return abs(lateral) <= lane.width / 2 + margin and -CAR_LENGTH <= s < lane.length + CAR_LENGTH
+
+
+@compiled
+def is_reachable(lane, s, lateral):
+    """May a car at this point in lane coordinates change to the lane?"""
+    return not lane.forbidden and abs(lateral) <= 2 * lane.width and 0.0 <= s < lane.length + CAR_LENGTH
+
+
+@compiled
+def is_after_end(lane, s):
+    """Has a car at arc length `s` come to the end of the lane?"""
+    return s > lane.length - CAR_LENGTH / 2
+
+
+@compiled
+def closest_lane(lanes, x, y, heading):
+    """Index of the lane nearest to a pose in position and heading."""
+    best, nearest = np.inf, 0
+    for k in range(len(lanes)):
+        lane = lanes[k]
+        s, lateral = local_coordinates(lane, x, y)
+        far = distance(lane, s, lateral) + abs(wrap_to_pi(heading - heading_at(lane, s)))
+        if far < best:
+            best, nearest = far, k
+    return nearest

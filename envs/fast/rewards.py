@@ -1,0 +1,112 @@
+"""Rewards and the ends of episodes."""
+
+
+from envs.fast.compiled import compiled
+from envs.fast.config import EXIT, HIGHWAY, MERGE, TWO_WAY
+from envs.fast.floats import clip, lmap
+from envs.fast.network import is_on_lane
+from envs.fast.state import DIRECT
+
+
+@compiled
+def is_on_road(cars, i, lanes, sight):
+    """Is a car on the lane that is nearest to it?"""
+    k = cars[i].lane
+    return is_on_lane(lanes[k], sight.s[k, i], sight.lateral[k, i], 0.0)
+
+
+@compiled
+def rate(cars, episode, action, lanes, sight, config, step):
+    """Reward of the last decision; its components go to `step`.
+
+    Args:
+      cars: `[N]` CAR.
+      episode: EPISODE.
+      action: of the agent; -1 = continuous, or none yet.
+      lanes: `[L]` LANE.
+      sight: this frame's.
+      config: CONFIG.
+      step: STEP, changed.
+    """
+    ego = cars[episode.ego]
+    crashed = 1.0 if ego.crashed else 0.0
+    on_road = 1.0 if is_on_road(cars, episode.ego, lanes, sight) else 0.0
+    changes_lane = 1.0 if action == 0 or action == 2 else 0.0
+    lane = ego.lane if ego.kind == DIRECT else ego.target_lane
+    step.reward_0 = crashed
+    if config.scenario == HIGHWAY:
+        step.reward_1 = lanes[lane].id / max(lanes[ego.lane].siblings - 1, 1)
+        step.reward_2 = clip(_scaled(ego.speed * ego.cos, config), 0.0, 1.0)
+        step.reward_3 = on_road
+        return _normalized(_weigh(step, config), config) * on_road
+    if config.scenario == MERGE:
+        step.reward_1 = lanes[ego.lane].id / 1
+        step.reward_2 = _scaled(ego.speed, config)
+        step.reward_3 = changes_lane
+        step.reward_4 = _slowness(cars, episode, config.other_lane)
+        return _normalized(_weigh(step, config), config)
+    if config.scenario == TWO_WAY:
+        others = lanes[ego.lane].siblings - 1
+        step.reward_0 = ego.speed_index / (config.speeds - 1)
+        step.reward_1 = (others - lanes[lane].id) / others
+        return _weigh(step, config)
+    if config.scenario == EXIT:
+        success = lane == config.goal_lane or lane == config.other_goal_lane
+        step.success = success
+        step.reward_1 = 1.0 if success else 0.0
+        step.reward_2 = clip(_scaled(ego.speed, config), 0.0, 1.0)
+        step.reward_3 = lanes[lane].id
+        reward = _normalized(_weigh(step, config), config)
+        return clip(reward, 0.0, 1.0) if config.normalize_reward else reward
+    # ROUNDABOUT
+    step.reward_1 = ego.speed_index / 2
+    step.reward_2 = changes_lane
+    step.reward_3 = on_road
+    return _normalized(_weigh(step, config), config) * on_road
+
+
+@compiled
+def _scaled(speed, config):
+    """Speed on the scale of the rewarded range."""
+    return lmap(speed, config.speed_low, config.speed_high, 0.0, 1.0)
+
+
+@compiled
+def _normalized(reward, config):
+    if config.normalize_reward:
+        return lmap(reward, config.reward_low, config.reward_high, 0.0, 1.0)
+    return reward
+
+
+@compiled
+def _slowness(cars, episode, lane):
+    """By what share of their target speeds the cars on a lane are too slow, added up."""
+    total = 0.0
+    for i in range(episode.vehicles):
+        if cars[i].lane == lane and cars[i].kind != DIRECT:
+            total += (cars[i].target_speed - cars[i].speed) / cars[i].target_speed
+    return total
+
+
+@compiled
+def _weigh(step, config):
+    """Weighted sum of the components, added up in their order."""
+    reward = config.weight_0 * step.reward_0
+    reward += config.weight_1 * step.reward_1
+    reward += config.weight_2 * step.reward_2
+    reward += config.weight_3 * step.reward_3
+    return reward + config.weight_4 * step.reward_4
+
+
+@compiled
+def is_terminated(cars, episode, lanes, sight, config):
+    """Is the state terminal?"""
+    ego = cars[episode.ego]
+    off_road = config.offroad_terminal and not is_on_road(cars, episode.ego, lanes, sight)
+    return ego.crashed or ego.x > config.end_x or off_road
+
+
+@compiled
+def is_truncated(episode, config):
+    """Is the time over?"""
+    return episode.time >= config.duration or (config.max_steps > 0 and episode.steps >= config.max_steps)

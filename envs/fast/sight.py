@@ -1,0 +1,192 @@
+"""Where every car is on every lane, and who is ahead of whom.
+
+Positions do not change while cars decide, so each car is projected on each lane once per frame.
+Every lane keeps the cars on it sorted by arc length; neighbours are then next to each other.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from envs.fast.compiled import compiled
+from envs.fast.floats import wrap_to_pi
+from envs.fast.network import distance, heading_at, is_on_lane, local_coordinates
+
+
+class Sight(NamedTuple):
+    """Working memory of one environment at a time, for N road users and L lanes."""
+
+    s: np.ndarray  # `[L, N]` arc length of each car on each lane [m]
+    lateral: np.ndarray  # `[L, N]` signed offset [m]
+    members: np.ndarray  # `[L, N]` cars on each lane, sorted by (arc length, index)
+    count: np.ndarray  # `[L]` how many
+    rank: np.ndarray  # `[L, N]` place of a car among the members, -1 = not on the lane
+    changing: np.ndarray  # `[N]` cars that head for another lane
+    pairs: np.ndarray  # `[N (N - 1) / 2]` pairs that may collide
+    corners: np.ndarray  # `[2, 4, 2]` of two boxes [m]
+    nearest: np.ndarray  # `[N]` observed cars
+    grid: np.ndarray  # `[speeds, lanes, times]` time-to-collision grid
+
+
+@njit
+def make_sight(n_lanes, n, speeds, lanes, times):
+    """Fresh working memory."""
+    return Sight(
+        np.empty((n_lanes, n)),
+        np.empty((n_lanes, n)),
+        np.empty((n_lanes, n), np.int32),
+        np.empty(n_lanes, np.int32),
+        np.empty((n_lanes, n), np.int32),
+        np.empty(n, np.int32),
+        np.empty(max(n * (n - 1) // 2, 1), np.int32),
+        np.empty((2, 4, 2)),
+        np.empty(n, np.int32),
+        np.empty((speeds, lanes, times)),
+    )
+
+
+@compiled
+def project(cars, n, lanes, sight):
+    """Lane coordinates of all cars on all lanes."""
+    for k in range(len(lanes)):
+        lane = lanes[k]
+        for i in range(n):
+            sight.s[k, i], sight.lateral[k, i] = local_coordinates(lane, cars[i].x, cars[i].y)
+
+
+@compiled
+def update_lanes(cars, n, lanes, sight):
+    """Put every vehicle on the lane that is nearest in position and heading."""
+    for i in range(n):
+        best, nearest = np.inf, 0
+        heading = cars[i].heading
+        for k in range(len(lanes)):
+            lane = lanes[k]
+            s = sight.s[k, i]
+            far = distance(lane, s, sight.lateral[k, i])
+            if far < best:  # the angle only adds to it
+                far += abs(wrap_to_pi(heading - heading_at(lane, s)))
+                if far < best:
+                    best, nearest = far, k
+        cars[i].lane = nearest
+
+
+@compiled
+def sort_along_x(cars, n, order):
+    """Keep `order` `[N]` sorted by x; it changes little from frame to frame."""
+    for a in range(1, n):
+        i = order[a]
+        b = a - 1
+        while b >= 0 and cars[order[b]].x > cars[i].x:
+            order[b + 1] = order[b]
+            b -= 1
+        order[b + 1] = i
+
+
+@compiled
+def line_up(n, lanes, order, sight):
+    """Sort the cars on each lane by arc length, ties by index."""
+    for k in range(len(lanes)):
+        lane = lanes[k]
+        s, members = sight.s[k], sight.members[k]
+        count = 0
+        for a in range(n):
+            i = order[a]
+            if is_on_lane(lane, s[i], sight.lateral[k, i], 1.0):
+                b = count - 1
+                while b >= 0 and (s[members[b]] > s[i] or (s[members[b]] == s[i] and members[b] > i)):
+                    members[b + 1] = members[b]
+                    b -= 1
+                members[b + 1] = i
+                count += 1
+            else:
+                sight.rank[k, i] = -1
+        for b in range(count):
+            sight.rank[k, members[b]] = b
+        sight.count[k] = count
+
+
+@compiled
+def _place(k, i, sight):
+    """First member of lane `k` with the arc length of car `i` or more; the car itself if it is on it."""
+    place = sight.rank[k, i]
+    if place >= 0:
+        return place
+    s, members = sight.s[k], sight.members[k]
+    low, high = 0, sight.count[k]
+    while low < high:
+        middle = (low + high) // 2
+        if s[members[middle]] < s[i]:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def car_ahead(k, i, n, net, lanes, sight):
+    """Nearest car ahead of car `i` on lane `k`, -1 = none. Of several side by side the last one."""
+    if net.links.shape[1] > 1:
+        return _car_ahead_connected(k, i, n, net, lanes, sight)
+    s, members, count = sight.s[k], sight.members[k], sight.count[k]
+    place = _place(k, i, sight)
+    ahead = place + 1 if sight.rank[k, i] >= 0 else place
+    if ahead < count:
+        while ahead + 1 < count and s[members[ahead + 1]] == s[members[ahead]]:
+            ahead += 1
+        if s[members[ahead]] == s[i] or place == 0 or s[members[place - 1]] != s[i]:
+            return members[ahead]
+    if place > 0 and s[members[place - 1]] == s[i]:
+        return members[place - 1]  # side by side with a lower index
+    return -1
+
+
+@compiled
+def car_behind(k, i, n, net, lanes, sight):
+    """Nearest car behind car `i` on lane `k`, -1 = none. Of several side by side the first one."""
+    if net.links.shape[1] > 1:
+        return _car_behind_connected(k, i, n, net, lanes, sight)
+    s, members = sight.s[k], sight.members[k]
+    behind = _place(k, i, sight) - 1
+    while behind >= 0 and s[members[behind]] == s[i]:
+        behind -= 1
+    if behind < 0:
+        return -1
+    while behind > 0 and s[members[behind - 1]] == s[members[behind]]:
+        behind -= 1
+    return members[behind]
+
+
+@compiled
+def _along(k, j, net, lanes, sight):
+    """Arc length of car `j` seen from lane `k` through its connected lanes, and whether it is on one."""
+    for m in range(net.links.shape[1]):
+        link = net.links[k, m]
+        if link < 0:
+            break
+        if is_on_lane(lanes[link], sight.s[link, j], sight.lateral[link, j], 1.0):
+            return sight.s[link, j] + net.link_offsets[k, m], True
+    return 0.0, False
+
+
+@compiled
+def _car_ahead_connected(k, i, n, net, lanes, sight):
+    nearest, ahead = np.inf, -1
+    for j in range(n):
+        if j != i:
+            s, found = _along(k, j, net, lanes, sight)
+            if found and s >= sight.s[k, i] and s <= nearest:
+                nearest, ahead = s, j
+    return ahead
+
+
+@compiled
+def _car_behind_connected(k, i, n, net, lanes, sight):
+    nearest, behind = -np.inf, -1
+    for j in range(n):
+        if j != i:
+            s, found = _along(k, j, net, lanes, sight)
+            if found and s < sight.s[k, i] and s > nearest:
+                nearest, behind = s, j
+    return behind

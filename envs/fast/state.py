@@ -1,0 +1,116 @@
+"""State of the engine: one record per car and one per environment.
+
+A batch of E environments with room for N road users each is `cars[E, N]` and `episodes[E]`. Fields of
+structured arrays are arrays: `cars["x"]` is `[E, N]`.
+"""
+
+import numpy as np
+
+from envs.fast.draws import GENERATOR
+
+# kinds of road users
+TRAFFIC = 0  # `IDMVehicle`
+META = 1  # `MDPVehicle`, driven by meta-actions
+DIRECT = 2  # `Vehicle`, driven by acceleration and steering
+OBSTACLE = 3  # `Obstacle`
+
+CAR = np.dtype(
+    [
+        ("x", "f8"),  # centre [m]
+        ("y", "f8"),
+        ("heading", "f8"),  # [rad]
+        ("speed", "f8"),  # [m/s]
+        ("cos", "f8"),  # of the heading
+        ("sin", "f8"),
+        ("acceleration", "f8"),  # command [m/s^2]
+        ("steering", "f8"),  # command [rad]
+        ("target_speed", "f8"),  # [m/s]
+        ("timer", "f8"),  # since the last thought about a lane change [s]
+        ("delta", "f8"),  # exponent of the driver's free acceleration
+        ("impact_x", "f8"),  # displacement due on the next step, if `hit` [m]
+        ("impact_y", "f8"),
+        ("length", "f8"),  # [m]
+        ("width", "f8"),
+        ("kind", "i4"),
+        ("lane", "i4"),  # lane it is on
+        ("target_lane", "i4"),  # lane it heads for
+        ("speed_index", "i4"),  # among the target speeds, of a META car
+        ("route", "i4"),  # row of the route tables, -1 = none
+        ("route_step", "i4"),  # steps of the route that lie behind
+        ("crashed", "?"),
+        ("hit", "?"),  # an impact is due
+        ("checks", "?"),  # looks for collisions itself
+        ("changes_lane", "?"),
+    ],
+    align=True,
+)
+
+EPISODE = np.dtype(
+    [
+        *GENERATOR,
+        ("time", "f8"),  # [s]
+        ("steps", "i4"),  # decisions since reset
+        ("cars", "i4"),  # road users present, obstacles included
+        ("vehicles", "i4"),  # of these, vehicles; they come first
+        ("ego", "i4"),  # index of the controlled vehicle
+        ("ended", "?"),  # the last step ended the episode
+        ("observed_lanes", "i4"),  # lanes of the road at reset, which scale the observed y
+        ("return_", "f8"),  # rewards since reset
+        # the shield on the ego
+        ("frame_lane", "i4"),  # lane it measures along, -1 = none yet
+        ("nominal_acceleration", "f8"),  # last command given from outside
+        ("nominal_steering", "f8"),
+        ("frames", "i4"),  # watched since reset
+        ("frames_overridden", "i4"),
+        ("cost", "f8"),
+        ("min_ttc", "f8"),  # [s]
+        ("blame", "i4"),  # 0 before a contact, then 1 + index into `shield.blame.VERDICTS`
+        ("blame_partner", "i4"),
+        ("blame_axes", "i4"),
+        ("blame_frames", "i4"),  # from the danger threshold to the contact
+        ("ego_duty", "i4"),
+        ("other_duty", "i4"),
+        ("ego_excess", "f8"),
+        ("other_excess", "f8"),
+    ],
+    align=True,
+)
+
+REWARDS = 5  # components of a reward, at most
+
+STEP = np.dtype(
+    [
+        ("speed", "f8"),  # of the ego [m/s]
+        ("crashed", "?"),
+        ("success", "?"),
+        *[(f"reward_{k}", "f8") for k in range(REWARDS)],
+        ("raw_reward", "f8"),
+        # what the shield saw and did
+        ("frames", "i4"),
+        ("overridden", "i4"),
+        ("limited", "i4"),
+        ("dangerous_pairs", "i4"),
+        ("broken_duties", "i4"),
+        ("acceleration_change", "f8"),
+        ("steering_change", "f8"),
+        ("margin_lon", "f8"),
+        ("margin_lat", "f8"),
+        ("partner", "i4"),
+        ("response", "i4"),
+        ("cost", "f8"),
+        ("override_share", "f8"),
+        ("episode_cost", "f8"),
+        ("min_ttc", "f8"),
+        ("blame", "i4"),
+        ("blame_partner", "i4"),
+        ("blame_axes", "i4"),
+        ("blame_frames", "i4"),
+        ("ego_duty", "i4"),
+        ("other_duty", "i4"),
+        ("ego_excess", "f8"),
+        ("other_excess", "f8"),
+        ("episode_return", "f8"),
+        ("episode_length", "i4"),
+    ],
+    align=True,
+)

@@ -1,0 +1,64 @@
+"""Many environments at once, on either simulator."""
+
+from functools import partial
+
+import gymnasium as gym
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.wrappers import RecordEpisodeStatistics
+
+from envs.fast.config import compile_scenario
+from envs.fast.vector import FastVectorEnv
+from envs.scenarios import make
+from envs.wrapper import MODES, _check_environment, _check_params, _settings
+from shield.params import PRESETS, Preset, RSSParams, Rules
+
+BACKENDS = ("fast", "highway-env")
+
+
+def make_vec(
+    env_id: str,
+    num_envs: int,
+    shield: str | None = "override",
+    backend: str = "fast",
+    params: Preset | tuple[RSSParams, RSSParams] = PRESETS["simulator"],
+    rules: Rules = Rules(),
+    intervention_penalty: float = 0.0,
+    config: dict | None = None,
+    threads: int = 1,
+    autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
+) -> VectorEnv:
+    """Environments side by side, each with a shield around its ego.
+
+    Both backends have the same spaces, seeds, episodes and infos.
+
+    Args:
+      env_id: "highway-fast-v0", "highway-v0", ...
+      num_envs: how many.
+      shield: "override", "monitor", or None for bare environments.
+      backend: "fast", the compiled engine, or "highway-env", the original one after the other.
+      params, rules, intervention_penalty: see `ShieldWrapper`.
+      config: as for `gymnasium.make` of a highway-env environment.
+      threads: of the compiled engine.
+      autoreset_mode: see `FastVectorEnv`.
+
+    Raises:
+      ValueError: unknown names, or something that the engine does not support; the message names it.
+    """
+    if backend not in BACKENDS:
+        raise ValueError(f"backend = {backend!r}: expected one of {', '.join(BACKENDS)}")
+    if shield is not None and shield not in MODES:
+        raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
+    if backend == "highway-env":
+        options = dict(params=params, rules=rules, intervention_penalty=intervention_penalty, config=config)
+        one = partial(_make_counted, env_id, shield, options)
+        return SyncVectorEnv([one] * num_envs, autoreset_mode=autoreset_mode)
+    scenario = compile_scenario(env_id, config)
+    settings = None
+    if shield is not None:
+        _check_environment(scenario.stock)
+        settings = _settings(_check_params(params), rules, shield, 1 / scenario.stock.config["simulation_frequency"])
+    return FastVectorEnv(scenario, num_envs, settings, intervention_penalty, autoreset_mode, threads)
+
+
+def _make_counted(env_id: str, shield: str | None, options: dict) -> gym.Env:
+    return RecordEpisodeStatistics(make(env_id, shield, **options))

@@ -1,0 +1,167 @@
+"""Engine and stock simulator side by side, from the same seeds, with the same actions."""
+
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+from highway_env.vehicle.behavior import IDMVehicle
+
+import envs
+from envs.fast.config import compile_scenario
+from envs.fast.draws import generator_state
+from envs.fast.engine import DISABLED, Engine
+from envs.fast.infos import info_of, step_infos
+from envs.fast.state import OBSTACLE, TRAFFIC
+
+POLICIES = ("random", "faster", "slower")
+
+
+class Comparison(NamedTuple):
+    """Largest differences found over some episodes."""
+
+    episodes: int
+    decisions: int
+    state: float  # positions [m], headings [rad], speeds [m/s], timers [s]
+    reward: float
+    observation_ulps: int
+    discrete: list[str]  # flags, lanes, indices, generators or infos that differ
+
+
+@contextmanager
+def stock_drivers():
+    """Undo what an intersection environment does to the class attributes of all traffic."""
+    names = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
+    saved = {name: getattr(IDMVehicle, name) for name in names}
+    try:
+        yield
+    finally:
+        for name, value in saved.items():
+            setattr(IDMVehicle, name, value)
+
+
+def actions_of(policy: str, space, rng):
+    """Next action of a policy."""
+    if isinstance(space, spaces.Box):
+        throttle = {"random": rng.uniform(-1, 1), "faster": 1.0, "slower": -1.0}[policy]
+        action = rng.uniform(-1, 1, space.shape) * (0.1 if policy != "random" else 1.0)
+        action[0] = throttle
+        return action.astype(np.float32)
+    names = {"faster": {5: 3, 3: 2}, "slower": {5: 4, 3: 0}}
+    return int(rng.integers(space.n)) if policy == "random" else names[policy][int(space.n)]
+
+
+def compare(env_id, seeds, policy="random", config=None, shield=None, max_steps=60, until=None) -> Comparison:
+    """Run one episode per seed on both and compare everything after every decision.
+
+    Args:
+      until: called with the number of decisions so far; stops when it returns True.
+    """
+    with stock_drivers():
+        return _compare(env_id, list(seeds), policy, config, shield, max_steps, until)
+
+
+def _compare(env_id, seeds, policy, config, shield, max_steps, until) -> Comparison:
+    stock = envs.make(env_id, shield=shield, config=config)
+    settings = stock.settings if shield else None
+    engine = Engine(compile_scenario(env_id, config), 1, settings, autoreset=DISABLED)
+    worst = {"state": 0.0, "reward": 0.0, "ulps": 0}
+    discrete: list[str] = []
+    decisions = episodes = 0
+    for seed in seeds:
+        rng = np.random.default_rng([seed, 99])
+        seen, _ = stock.reset(seed=seed)
+        engine.seed([seed])
+        out = engine.reset()
+        where = f"{env_id} {policy} seed {seed}"
+        _compare_state(stock.unwrapped, engine, f"{where} reset", worst, discrete)
+        _compare_observation(seen, out, worst)
+        for step in range(max_steps):
+            action = actions_of(policy, stock.action_space, rng)
+            seen, reward, terminated, truncated, info = stock.step(action)
+            out = engine.step(*engine_inputs(engine, action))
+            decisions += 1
+            here = f"{where} step {step}"
+            _compare_state(stock.unwrapped, engine, here, worst, discrete)
+            _compare_observation(seen, out, worst)
+            worst["reward"] = max(worst["reward"], abs(reward - out.rewards[0]))
+            if (terminated, truncated) != (out.terminated[0], out.truncated[0]):
+                discrete.append(f"{here}: ends {terminated, truncated}, {out.terminated[0], out.truncated[0]}")
+            if shield:
+                _compare_info(info, step_infos(out.steps, engine.scenario, settings), here, discrete)
+            if terminated or truncated or discrete:
+                break
+        episodes += 1
+        if until and until(decisions):
+            break
+    stock.close()
+    return Comparison(episodes, decisions, worst["state"], worst["reward"], worst["ulps"], discrete)
+
+
+def engine_inputs(engine, action):
+    """What one action of the stock environment is for an engine of one environment."""
+    scenario = engine.scenario
+    if len(scenario.labels):
+        return np.array([action], np.int32), None
+    return None, scenario.commands(np.asarray(action)[None])
+
+
+def _compare_state(env, engine, where, worst, discrete) -> None:
+    road = env.road
+    users = [*road.vehicles, *road.objects]
+    episode = engine.batch.episodes[0]
+    if len(users) != episode["cars"]:
+        discrete.append(f"{where}: {len(users)} road users, {episode['cars']}")
+        return
+    indices = {index: i for i, index in enumerate(road.network.lanes_dict())}
+    for i, user in enumerate(users):
+        car = engine.batch.cars[0, i]
+        numbers = {
+            "x": user.position[0],
+            "y": user.position[1],
+            "heading": user.heading,
+            "speed": user.speed,
+        }
+        flags = {"lane": indices[user.lane_index], "crashed": user.crashed}
+        if car["kind"] != OBSTACLE:
+            flags["hit"] = user.impact is not None
+        if hasattr(user, "target_lane_index"):
+            flags["target_lane"] = indices[user.target_lane_index]
+            numbers["target_speed"] = user.target_speed
+        if hasattr(user, "speed_index"):
+            flags["speed_index"] = user.speed_index
+        if car["kind"] == TRAFFIC:
+            numbers["timer"], numbers["delta"] = user.timer, user.DELTA
+        for name, value in numbers.items():
+            worst["state"] = max(worst["state"], abs(value - car[name]))
+            if not abs(value - car[name]) < 1e-6:
+                discrete.append(f"{where}: car {i} {name} {value} {car[name]}")
+        for name, value in flags.items():
+            if value != car[name]:
+                discrete.append(f"{where}: car {i} {name} {value} {car[name]}")
+    if road.np_random.bit_generator.state != generator_state(episode):
+        discrete.append(f"{where}: random generator")
+
+
+def _compare_observation(seen, out, worst) -> None:
+    ours = out.observations[0].reshape(seen.shape)
+    spacing = np.spacing(np.maximum(np.abs(seen), np.float32(1e-7)))
+    worst["ulps"] = max(worst["ulps"], int(np.ceil(np.max(np.abs(seen - ours) / spacing))))
+
+
+def _compare_info(info, infos, where, discrete) -> None:
+    ours = info_of(infos, 0)
+    theirs = {key: info[key] for key in ours}
+    theirs["shield"] = {key: info["shield"][key] for key in ours["shield"]}
+    for name, (a, b) in _flat(theirs, ours):
+        close = isinstance(a, float) and abs(a - b) <= 1e-8 * max(1.0, abs(a))
+        if not (a == b or close):
+            discrete.append(f"{where}: info {name} {a!r} {b!r}")
+
+
+def _flat(a, b, prefix=""):
+    for key in a:
+        if isinstance(a[key], dict):
+            yield from _flat(a[key], b[key], f"{prefix}{key}.")
+        else:
+            yield prefix + key, (a[key], b[key])

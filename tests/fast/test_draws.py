@@ -1,0 +1,45 @@
+"""Random numbers are numpy's, bit for bit."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from envs.fast.draws import GENERATOR, generator_state, integers, load_generator, normal, random, uniform
+
+
+@njit
+def _draw(generators, kinds, out):
+    rng = generators[0]
+    for i in range(len(kinds)):
+        if kinds[i] == 0:
+            out[i] = uniform(rng, 0.9, 1.1)
+        elif kinds[i] == 1:
+            out[i] = integers(rng, 3)
+        elif kinds[i] == 2:
+            out[i] = normal(rng)
+        elif kinds[i] == 3:
+            out[i] = integers(rng, 1)
+        elif kinds[i] == 4:
+            out[i] = random(rng)
+        else:
+            out[i] = integers(rng, 3_000_000_000)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2**40])
+def test_a_mix_of_draws_is_that_of_numpy(seed):
+    kinds = np.random.default_rng(1).integers(6, size=50_000)
+    rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
+    generator = np.zeros(1, np.dtype(GENERATOR, align=True))
+    load_generator(generator[0], rng.bit_generator)
+    ours = np.empty(len(kinds))
+    _draw(generator, kinds, ours)
+    draws = {
+        0: lambda: rng.uniform(0.9, 1.1),
+        1: lambda: rng.choice(3),
+        2: lambda: rng.normal(),
+        4: lambda: rng.random(),
+        5: lambda: rng.integers(3_000_000_000),
+    }
+    theirs = np.array([0 if kind == 3 else draws[kind]() for kind in kinds], float)
+    assert np.array_equal(ours, theirs)
+    assert generator_state(generator[0]) == rng.bit_generator.state

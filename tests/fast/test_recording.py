@@ -1,0 +1,56 @@
+"""Episode logs, and engine states in real environments."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import envs
+from envs.fast.replay import read, show
+
+ENV = "highway-fast-v0"
+
+
+def test_chosen_environments_are_recorded_frame_by_frame():
+    env = envs.make_vec(ENV, 3, shield=None)
+    env.reset(seed=0)
+    env.recording.choose([2])
+    while not env.recording.finished:
+        before = env.engine.batch.cars[2].copy()
+        env.step(np.full(3, 3))
+    log = env.recording.finished[0]
+    assert log.env == 2 and log.complete
+    assert (len(log.cars) - 1) % 5 == 0
+    assert (log.count == 21).all()
+    assert np.array_equal(log.cars[-6], before)
+    assert log.cars["crashed"][-1].any()
+    assert len(env.recording.running(2).cars) == 1
+
+
+@pytest.mark.parametrize("env_id", [ENV, "merge-v0", "exit-v0", "roundabout-v0"])
+def test_a_loaded_state_goes_on_like_the_engine(env_id):
+    fast = envs.make_vec(env_id, 1, shield=None)
+    fast.reset(seed=4)
+    fast.step(np.array([1]))
+    stock = gym.make(env_id).unwrapped
+    stock.reset(seed=0)
+    show(stock, fast.engine.batch.cars[0], fast.scenario.network, fast.engine.batch.episodes[0])
+    for action in (1, 0, 3):
+        seen, reward, *_ = stock.step(action)
+        observations, rewards, *_ = fast.step(np.array([action]))
+        np.testing.assert_allclose(seen, observations[0], atol=1e-6)
+        assert reward == pytest.approx(rewards[0], abs=1e-8)
+
+
+def test_a_state_of_highway_env_goes_on_in_the_engine():
+    stock = gym.make(ENV).unwrapped
+    stock.reset(seed=11)
+    stock.step(1)
+    fast = envs.make_vec(ENV, 1, shield=None)
+    fast.reset(seed=0)
+    batch = fast.engine.batch
+    read(stock, batch.cars[0], batch.episodes[0], batch.order[0])
+    for action in (2, 3, 1):
+        seen, reward, *_ = stock.step(action)
+        observations, rewards, *_ = fast.step(np.array([action]))
+        np.testing.assert_allclose(seen, observations[0], atol=1e-6)
+        assert reward == pytest.approx(rewards[0], abs=1e-8)

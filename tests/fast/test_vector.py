@@ -1,0 +1,156 @@
+"""The vector environment: seeds, autoreset, infos, threads."""
+
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+import envs
+from envs.fast.config import Unsupported, compile_scenario
+
+ENV = "highway-fast-v0"
+
+
+def _rollout(steps=12, num_envs=6, env_id=ENV, **options):
+    env = envs.make_vec(env_id, num_envs, **options)
+    rng = np.random.default_rng(0)
+    seen = [env.reset(seed=7)[0]]
+    infos = []
+    for _ in range(steps):
+        observations, rewards, terminated, truncated, info = env.step(rng.integers(5, size=num_envs))
+        seen += [observations, rewards, terminated, truncated]
+        infos.append(info)
+    env.close()
+    return seen, infos
+
+
+@pytest.mark.parametrize("shield", [None, "override"])
+def test_both_backends_return_the_same(shield):
+    fast, fast_infos = _rollout(10, 2, shield=shield)
+    stock, stock_infos = _rollout(10, 2, shield=shield, backend="highway-env")
+    for a, b in zip(fast, stock, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-6)
+    for a, b in zip(fast_infos, stock_infos, strict=True):
+        np.testing.assert_allclose(a["speed"], b["speed"], atol=1e-8)
+        assert ("final_info" in a) == ("final_info" in b)
+        if "final_info" in a:
+            where = a["_final_info"]
+            assert np.array_equal(where, b["_final_info"])
+            for e in np.flatnonzero(where):
+                np.testing.assert_allclose(a["final_obs"][e], b["final_obs"][e], atol=1e-6)
+                assert a["final_info"]["episode"]["r"][e] == pytest.approx(b["final_info"]["episode"]["r"][e], abs=1e-6)
+                assert a["final_info"]["episode"]["l"][e] == b["final_info"]["episode"]["l"][e]
+
+
+def test_results_do_not_depend_on_the_number_of_threads():
+    one, _ = _rollout(20, 7, shield="override", threads=1)
+    three, _ = _rollout(20, 7, shield="override", threads=3)
+    assert all(np.array_equal(a, b) for a, b in zip(one, three, strict=True))
+
+
+def test_an_environment_does_not_depend_on_its_neighbours():
+    many, _ = _rollout(5, 6)
+    few = envs.make_vec(ENV, 2)
+    observations, _ = few.reset(seed=7)
+    assert np.array_equal(observations, many[0][:2])
+
+
+def test_seeds_may_be_given_one_by_one():
+    env = envs.make_vec(ENV, 3, shield=None)
+    observations, _ = env.reset(seed=[5, 5, 6])
+    assert np.array_equal(observations[0], observations[1])
+    assert not np.array_equal(observations[0], observations[2])
+    with pytest.raises(ValueError, match="2 seeds"):
+        env.reset(seed=[1, 2])
+
+
+def _until_an_end(env, action=3):
+    env.reset(seed=0)
+    while True:
+        observations, rewards, terminated, truncated, infos = env.step(np.full(env.num_envs, action))
+        if (terminated | truncated).any():
+            return observations, rewards, terminated | truncated, infos
+
+
+def test_same_step_autoreset_returns_the_first_observation_of_the_next_episode():
+    env = envs.make_vec(ENV, 3, shield=None)
+    observations, _, ended, infos = _until_an_end(env)
+    e = np.flatnonzero(ended)[0]
+    assert env.engine.batch.episodes["steps"][e] == 0
+    assert infos["final_info"]["crashed"][e]
+    assert not infos["crashed"][e]
+    assert not np.array_equal(infos["final_obs"][e], observations[e])
+    assert np.array_equal(infos["_final_info"], ended)
+
+
+def test_next_step_autoreset_spends_a_step_on_the_reset():
+    env = envs.make_vec(ENV, 3, shield=None, autoreset_mode=AutoresetMode.NEXT_STEP)
+    _, _, ended, infos = _until_an_end(env)
+    assert "final_info" not in infos
+    _, rewards, terminated, truncated, _ = env.step(np.full(3, 1))
+    assert (rewards[ended] == 0.0).all()
+    assert not (terminated | truncated)[ended].any()
+    assert (env.engine.batch.episodes["steps"][ended] == 0).all()
+
+
+def test_disabled_autoreset_leaves_resets_to_the_caller():
+    env = envs.make_vec(ENV, 3, shield=None, autoreset_mode=AutoresetMode.DISABLED)
+    observations, _, ended, _ = _until_an_end(env)
+    fresh, _ = env.reset(options={"reset_mask": ended})
+    steps = env.engine.batch.episodes["steps"]
+    assert (steps[ended] == 0).all()
+    assert (steps[~ended] > 0).all()
+    assert np.array_equal(fresh[~ended], observations[~ended])
+
+
+def test_infos_of_one_environment_are_plain_values():
+    env = envs.make_vec(ENV, 2)
+    env.reset(seed=3)
+    env.step(np.array([3, 3]))
+    info = env.info(1)
+    assert info["blame"] == ""
+    assert info["blame_evidence"] == {}
+    assert isinstance(info["shield"]["override_fraction"], float)
+    assert info["shield"]["proposed_action"] == 3
+
+
+@pytest.mark.parametrize(
+    ("env_id", "config", "named"),
+    [
+        ("parking-v0", None, "parking-v0"),
+        (ENV, {"controlled_vehicles": 2}, "controlled_vehicles"),
+        (ENV, {"other_vehicles_type": "highway_env.vehicle.behavior.LinearVehicle"}, "LinearVehicle"),
+        (ENV, {"observation": {"type": "OccupancyGrid"}}, "OccupancyGrid"),
+        (ENV, {"observation": {"type": "Kinematics", "features": ["x", "cos_d"]}}, "cos_d"),
+        (ENV, {"observation": {"type": "Kinematics", "order": "shuffled"}}, "shuffled"),
+        (ENV, {"action": {"type": "ContinuousAction", "dynamical": True}}, "dynamical"),
+        ("merge-v0", {"action": {"type": "ContinuousAction"}}, "ContinuousAction"),
+    ],
+)
+def test_an_unsupported_feature_is_named(env_id, config, named):
+    with pytest.raises(Unsupported, match=named):
+        compile_scenario(env_id, config)
+
+
+def test_unknown_names_are_errors():
+    with pytest.raises(ValueError, match="backend"):
+        envs.make_vec(ENV, 1, backend="slow")
+    with pytest.raises(ValueError, match="shield"):
+        envs.make_vec(ENV, 1, shield="off")
+    with pytest.raises(ValueError, match="roundabout|Roundabout"):
+        envs.make_vec("roundabout-v0", 1, shield="override")
+
+
+def test_an_intervention_penalty_is_taken_from_the_reward():
+    def total(penalty):
+        env = envs.make_vec(ENV, 4, intervention_penalty=penalty)
+        env.reset(seed=0)
+        rewards, fractions = 0.0, 0.0
+        for _ in range(3):
+            _, r, _, _, infos = env.step(np.full(4, 3))
+            rewards, fractions = rewards + r, fractions + infos["shield"]["override_fraction"]
+        return rewards, fractions
+
+    bare, fractions = total(0.0)
+    paid, _ = total(0.5)
+    assert fractions.max() > 0
+    np.testing.assert_allclose(bare - paid, 0.5 * fractions)
