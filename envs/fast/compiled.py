@@ -1,26 +1,27 @@
 """How the engine is compiled, and when again."""
 
-from hashlib import sha256
 from pathlib import Path
 
-import shield
 from numba import njit
+
+from shield.compiled import fingerprint
 
 # Inner functions allocate nothing, so numba need not count references to the arrays they are handed.
 # Counting would cost far more than what they compute. They are compiled into the kernel, which alone
-# is cached.
+# is cached. Functions that call those of `shield/`, which do allocate, are plain `njit`.
 compiled = njit(_nrt=False, error_model="numpy")
 
+# Calls hand over tuples of arrays field by field. Where that would cost more than the work, the
+# function is merged into its caller.
+merged = njit(_nrt=False, error_model="numpy", forceinline=True)
 
-def fingerprint() -> int:
-    """A number that changes with every source file that the kernel is made of.
 
-    numba looks only at the file of a cached function itself; without this the kernel would go on
-    with old versions of the functions it calls.
+def kernel(function):
+    """Compile an entry point that releases the interpreter lock, with a cache on disk.
+
+    As in `shield.compiled`, any change in what the kernel is made of compiles it anew.
     """
-    sources = [*Path(__file__).parent.glob("*.py"), *Path(shield.__file__).parent.glob("*.py")]
-    sources.append(Path(__file__).parent.parent / "highway.py")
-    digest = sha256()
-    for source in sorted(sources):
-        digest.update(source.name.encode() + source.read_bytes())
-    return int.from_bytes(digest.digest()[:7])
+    dispatcher = njit(cache=True, nogil=True)(function)
+    here = Path(__file__).parent
+    dispatcher._cache._cache_file._source_stamp = fingerprint(*here.glob("*.py"), here.parent / "highway.py")
+    return dispatcher

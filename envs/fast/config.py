@@ -202,9 +202,7 @@ def _check(given: dict) -> None:
     if given["manual_control"]:
         raise Unsupported("manual_control = True", "False")
     if given["simulation_frequency"] < given["policy_frequency"]:
-        raise Unsupported(
-            f"simulation_frequency = {given['simulation_frequency']}", f">= {given['policy_frequency']}"
-        )
+        raise Unsupported(f"simulation_frequency = {given['simulation_frequency']}", f">= {given['policy_frequency']}")
 
 
 def _fill_traffic(record) -> None:
@@ -307,9 +305,7 @@ def _fill_highway(record, given: dict, env, number: dict) -> tuple[str, ...]:
     record["reward_low"] = given["collision_reward"]
     record["reward_high"] = given["high_speed_reward"] + given["right_lane_reward"]
     record["speed_low"], record["speed_high"] = given["reward_speed_range"]
-    return _set_weights(
-        record, given, ("collision_reward", "right_lane_reward", "high_speed_reward", "on_road_reward")
-    )
+    return _set_weights(record, given, ("collision_reward", "right_lane_reward", "high_speed_reward", "on_road_reward"))
 
 
 def _fill_merge(record, given: dict, env, number: dict) -> tuple[str, ...]:
@@ -343,9 +339,7 @@ def _fill_exit(record, given: dict, env, number: dict) -> tuple[str, ...]:
     record["normalize_reward"] = given["normalize_reward"]
     record["reward_low"], record["reward_high"] = given["collision_reward"], given["goal_reward"]
     record["speed_low"], record["speed_high"] = given["reward_speed_range"]
-    return _set_weights(
-        record, given, ("collision_reward", "goal_reward", "high_speed_reward", "right_lane_reward")
-    )
+    return _set_weights(record, given, ("collision_reward", "goal_reward", "high_speed_reward", "right_lane_reward"))
 
 
 def _fill_roundabout(record, given: dict, env, number: dict) -> tuple[str, ...]:

@@ -133,6 +133,9 @@ def normal(rng):
                 far = -ziggurat_nor_inv_r * np.log1p(-random(rng))
                 density = -np.log1p(-random(rng))
                 if density + density > far * far:
-                    return -(ziggurat_nor_r + far) if (mantissa >> np.uint64(8)) & np.uint64(1) else ziggurat_nor_r + far
-        elif (fi_double[layer - np.uint64(1)] - fi_double[layer]) * random(rng) + fi_double[layer] < np.exp(-0.5 * x * x):
-            return x
+                    left = (mantissa >> np.uint64(8)) & np.uint64(1)
+                    return -(ziggurat_nor_r + far) if left else ziggurat_nor_r + far
+        else:
+            upper, lower = fi_double[layer - np.uint64(1)], fi_double[layer]
+            if (upper - lower) * random(rng) + lower < np.exp(-0.5 * x * x):
+                return x

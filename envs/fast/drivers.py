@@ -6,7 +6,7 @@ Vehicles decide one after the other, and later ones see the target lanes of earl
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
-from envs.fast.compiled import compiled
+from envs.fast.compiled import compiled, merged
 from envs.fast.floats import clip, dot, not_zero, wrap_to_pi
 from envs.fast.network import distance, heading_at, is_after_end, is_reachable, local_coordinates, position
 from envs.fast.sight import car_ahead, car_behind
@@ -30,7 +30,7 @@ def decide(cars, episode, net, lanes, sight, idm):
       episode: EPISODE.
       net, lanes: the network and its LANE records.
       sight: this frame's, with the cars lined up.
-      idm: IDM record, parameters of the traffic.
+      idm: CONFIG, parameters of the traffic.
     """
     n = episode.cars
     changing = 0
@@ -59,12 +59,12 @@ def take_meta_action(cars, i, action, net, lanes, sight, target_speeds):
     """Change the target speed or lane of the car, as `MDPVehicle.act` does with a label."""
     car = cars[i]
     last = len(target_speeds) - 1
-    if action == FASTER or action == SLOWER:
+    if action in (FASTER, SLOWER):
         change = 1 if action == FASTER else -1
         car.speed_index = int(clip(speed_to_index(car.speed, target_speeds) + change, 0, last))
         car.target_speed = target_speeds[car.speed_index]
     follow_road(cars, i, net, lanes, sight)
-    if action == LANE_LEFT or action == LANE_RIGHT:
+    if action in (LANE_LEFT, LANE_RIGHT):
         target = lanes[car.target_lane]
         step = 1 if action == LANE_RIGHT else -1
         lane = car.target_lane + int(clip(target.id + step, 0, target.siblings - 1)) - target.id
@@ -80,7 +80,7 @@ def speed_to_index(speed, target_speeds):
     return int(clip(np.rint(x * last), 0, last))
 
 
-@compiled
+@merged
 def control(cars, i, net, lanes, sight):
     """Follow the target lane at the target speed."""
     car = cars[i]
@@ -89,7 +89,7 @@ def control(cars, i, net, lanes, sight):
     car.acceleration = _KP_ACCELERATION * (car.target_speed - car.speed)
 
 
-@compiled
+@merged
 def steer(cars, i, lanes, sight):
     """Steering angle that leads the car to the middle of its target lane [rad]."""
     car = cars[i]
@@ -107,7 +107,7 @@ def steer(cars, i, lanes, sight):
 # ---------------------------------------------------------------- routes
 
 
-@compiled
+@merged
 def follow_road(cars, i, net, lanes, sight):
     """At the end of the target lane, head for the next one."""
     car = cars[i]
@@ -173,7 +173,7 @@ def _lane_on(road, lane_id, k, x, y, net, lanes):
 # ---------------------------------------------------------------- traffic: IDM and MOBIL
 
 
-@compiled
+@merged
 def _drive_in_traffic(cars, i, n, changing, net, lanes, sight, idm):
     car = cars[i]
     follow_road(cars, i, net, lanes, sight)
@@ -181,21 +181,24 @@ def _drive_in_traffic(cars, i, n, changing, net, lanes, sight, idm):
         _change_lane(cars, i, n, changing, net, lanes, sight, idm)
     car.steering = steer(cars, i, lanes, sight)
     ahead = car_ahead(car.lane, i, n, net, lanes, sight)
-    a = idm_acceleration(cars, i, ahead, car.delta, lanes, sight, idm)
+    a = idm_acceleration(cars, i, ahead, car.delta, lanes, sight.s, idm)
     if car.lane != car.target_lane:
         ahead = car_ahead(car.target_lane, i, n, net, lanes, sight)
-        a = min(a, idm_acceleration(cars, i, ahead, car.delta, lanes, sight, idm))
+        a = min(a, idm_acceleration(cars, i, ahead, car.delta, lanes, sight.s, idm))
     car.acceleration = clip(a, -idm.acc_max, idm.acc_max)
 
 
 @compiled
-def idm_acceleration(cars, i, ahead, delta, lanes, sight, idm):
+def idm_acceleration(cars, i, ahead, delta, lanes, s, idm):
     """Acceleration of car `i` behind car `ahead` by the Intelligent Driver Model [m/s^2].
 
     Args:
       i: the follower, -1 = nobody.
       ahead: the leader, -1 = free road.
       delta: exponent of whoever asks.
+      lanes: `[L]` LANE.
+      s: `[L, N]` arc lengths.
+      idm: CONFIG, parameters of the traffic.
     """
     if i < 0 or cars[i].kind == OBSTACLE:
         return 0.0
@@ -204,7 +207,7 @@ def idm_acceleration(cars, i, ahead, delta, lanes, sight, idm):
     target = clip(target, 0.0, lanes[car.lane].speed_limit)
     a = idm.comfort_acc_max * (1 - (max(car.speed, 0.0) / abs(not_zero(target))) ** delta)
     if ahead >= 0:
-        gap = sight.s[car.lane, ahead] - sight.s[car.lane, i]
+        gap = s[car.lane, ahead] - s[car.lane, i]
         ratio = desired_gap(cars, i, ahead, idm) / not_zero(gap)
         a -= idm.comfort_acc_max * (ratio * ratio)
     return a
@@ -224,7 +227,7 @@ def desired_gap(cars, i, ahead, idm):
     return idm.distance_wanted + car.speed * idm.time_wanted + car.speed * approach / braking
 
 
-@compiled
+@merged
 def _change_lane(cars, i, n, changing, net, lanes, sight, idm):
     """Start a lane change, or give one up."""
     car = cars[i]
@@ -269,13 +272,13 @@ def _is_change_worthwhile(cars, i, k, n, net, lanes, sight, idm):
     car = cars[i]
     ahead = car_ahead(k, i, n, net, lanes, sight)
     behind = car_behind(k, i, n, net, lanes, sight)
-    if idm_acceleration(cars, behind, i, car.delta, lanes, sight, idm) < -idm.max_braking_imposed:
+    if idm_acceleration(cars, behind, i, car.delta, lanes, sight.s, idm) < -idm.max_braking_imposed:
         return False
-    a = idm_acceleration(cars, i, ahead, car.delta, lanes, sight, idm)
+    a = idm_acceleration(cars, i, ahead, car.delta, lanes, sight.s, idm)
     if car.route >= 0 and car.route_step < route_length(net, car.route):
         lane_id = net.route_lanes[car.route, car.route_step]
         if lane_id >= 0:
             here = lanes[car.target_lane].id
             return np.sign(lanes[k].id - here) == np.sign(lane_id - here) and a >= -idm.max_braking_imposed
     ahead = car_ahead(car.lane, i, n, net, lanes, sight)
-    return a - idm_acceleration(cars, i, ahead, car.delta, lanes, sight, idm) >= idm.min_acc_gain
+    return a - idm_acceleration(cars, i, ahead, car.delta, lanes, sight.s, idm) >= idm.min_acc_gain

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from envs.fast.compiled import fingerprint
 from envs.fast.collisions import collide
+from envs.fast.compiled import compiled, kernel
 from envs.fast.config import Scenario
 from envs.fast.draws import load_generator
 from envs.fast.drivers import decide, take_meta_action
@@ -100,15 +100,15 @@ class Film(NamedTuple):
     cars: np.ndarray  # `[slots, frames, N]` CAR after each frame
 
 
-@njit
-def _restart(cars, episode, order, memory, before, world, sight, mode, step, out):
+@compiled
+def _restart(cars, episode, order, memory, before, world, sight, watch, mode, step, out):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
     make_scene(cars, episode, order, world.network, lanes, config, world.target_speeds, world.lane_odds)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
     project(cars, episode.cars, lanes, sight)
     sort_along_x(cars, episode.cars, order)
-    start_watch(episode, memory, before)
+    start_watch(episode, memory, before, watch)
     start_tally(step)
     rate(cars, episode, -1, lanes, sight, config, step)
     step.raw_reward = 0.0
@@ -116,7 +116,7 @@ def _restart(cars, episode, order, memory, before, world, sight, mode, step, out
     _see(cars, episode, world, sight, out)
 
 
-@njit
+@compiled
 def _see(cars, episode, world, sight, out):
     observe(
         cars,
@@ -132,7 +132,7 @@ def _see(cars, episode, world, sight, out):
     )
 
 
-@njit
+@compiled
 def _report(cars, episode, mode, cost, step):
     """Fill in what every step says."""
     ego = cars[episode.ego]
@@ -142,6 +142,8 @@ def _report(cars, episode, mode, cost, step):
         episode.cost += cost
         step.cost, step.episode_cost = cost, episode.cost
         step.override_share = episode.frames_overridden / max(episode.frames, 1)
+        step.episode_dangerous_pairs = episode.dangerous_pairs
+        step.episode_broken_duties = episode.broken_duties
         step.min_ttc = min(episode.min_ttc, _LONGEST_TTC)
         step.blame, step.blame_partner = episode.blame, episode.blame_partner
         step.blame_axes, step.blame_frames = episode.blame_axes, episode.blame_frames
@@ -161,7 +163,8 @@ def _advance(e, cars, episode, order, memory, before, world, sight, watch, setti
     for frame in range(config.frames):
         if frame == 0:
             if config.meta_actions:
-                take_meta_action(cars, episode.ego, world.labels[inputs.actions[e]], net, lanes, sight, world.target_speeds)
+                label = world.labels[inputs.actions[e]]
+                take_meta_action(cars, episode.ego, label, net, lanes, sight, world.target_speeds)
             else:
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
@@ -175,7 +178,8 @@ def _advance(e, cars, episode, order, memory, before, world, sight, watch, setti
         sort_along_x(cars, episode.cars, order)
         collide(cars, episode, order, sight, config.dt)
         if film.slots[e] >= 0:
-            film.cars[film.slots[e], frame] = cars
+            for i in range(len(cars)):
+                film.cars[film.slots[e], frame, i] = cars[i]
     episode.time += config.period
     episode.steps += 1
     cost = 0.0
@@ -186,53 +190,44 @@ def _advance(e, cars, episode, order, memory, before, world, sight, watch, setti
     return cost
 
 
-def _make_kernel(version: int):
-    """The one compiled entry point; `version` makes numba's cache notice changes elsewhere."""
-
-    @njit(cache=True, nogil=True)
-    def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalty, autoreset):
-        """One decision of the environments `first` to `last` - 1, resets included."""
-        if version < 0:
-            return
-        config, lanes = world.config[0], world.network.lanes
-        n = batch.cars.shape[1]
-        sight = make_sight(len(lanes), n, config.speeds, config.lanes, config.times)
-        watch = make_watch(n)
-        for e in range(first, last):
-            cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
-            memory, before, observation = batch.memory[e], batch.before[e], outputs.observations[e]
-            outputs.rewards[e] = 0.0
-            outputs.terminated[e] = outputs.truncated[e] = False
-            if inputs.todo[e] == STAY:
-                project(cars, episode.cars, lanes, sight)
-                _see(cars, episode, world, sight, observation)
-                _report(cars, episode, mode, 0.0, step)
-                continue
-            if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
-                _restart(cars, episode, order, memory, before, world, sight, mode, step, observation)
-                continue
-            cost = _advance(
-                e, cars, episode, order, memory, before, world, sight, watch, settings, mode, inputs, film, step
-            )
+@kernel
+def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalty, autoreset):
+    """One decision of the environments `first` to `last` - 1, resets included."""
+    config, lanes = world.config[0], world.network.lanes
+    n = batch.cars.shape[1]
+    sight = make_sight(len(lanes), n, config.speeds, config.lanes, config.times)
+    watch = make_watch(n)
+    for e in range(first, last):
+        cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
+        memory, before, observation = batch.memory[e], batch.before[e], outputs.observations[e]
+        outputs.rewards[e] = 0.0
+        outputs.terminated[e] = outputs.truncated[e] = False
+        if inputs.todo[e] == STAY:
+            project(cars, episode.cars, lanes, sight)
             _see(cars, episode, world, sight, observation)
-            reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
-            step.raw_reward = reward
-            reward -= penalty * step.overridden / max(step.frames, 1)
-            episode.return_ += reward
-            outputs.rewards[e] = reward
-            outputs.terminated[e] = is_terminated(cars, episode, lanes, sight, config)
-            outputs.truncated[e] = is_truncated(episode, config)
-            episode.ended = outputs.terminated[e] or outputs.truncated[e]
-            _report(cars, episode, mode, cost, step)
-            if episode.ended and autoreset == SAME_STEP:
-                outputs.final_observations[e] = observation
-                outputs.final_steps[e] = step
-                _restart(cars, episode, order, memory, before, world, sight, mode, step, observation)
+            _report(cars, episode, mode, 0.0, step)
+            continue
+        if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
+            _restart(cars, episode, order, memory, before, world, sight, watch, mode, step, observation)
+            continue
+        cost = _advance(
+            e, cars, episode, order, memory, before, world, sight, watch, settings, mode, inputs, film, step
+        )
+        _see(cars, episode, world, sight, observation)
+        reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
+        step.raw_reward = reward
+        reward -= penalty * step.overridden / max(step.frames, 1)
+        episode.return_ += reward
+        outputs.rewards[e] = reward
+        outputs.terminated[e] = is_terminated(cars, episode, lanes, sight, config)
+        outputs.truncated[e] = is_truncated(episode, config)
+        episode.ended = outputs.terminated[e] or outputs.truncated[e]
+        _report(cars, episode, mode, cost, step)
+        if episode.ended and autoreset == SAME_STEP:
+            outputs.final_observations[e, :] = observation
+            outputs.final_steps[e] = step
+            _restart(cars, episode, order, memory, before, world, sight, watch, mode, step, observation)
 
-    return run
-
-
-_run = _make_kernel(fingerprint())
 
 class Engine:
     """E environments in lockstep, as arrays.
@@ -325,14 +320,15 @@ class Engine:
             np.zeros((e, self._size), np.float32),
             np.zeros(e, STEP),
         )
-        common = (self.world, self.batch, inputs, outputs, self.film, self.settings, self.mode, self.penalty, self.autoreset)
-        if not _run.signatures:
+        rules = (self.settings, self.mode, self.penalty, self.autoreset)
+        common = (self.world, self.batch, inputs, outputs, self.film, *rules)
+        if not run.signatures:
             _warm_up(common)
         if self._pool is None:
-            _run(0, e, *common)
+            run(0, e, *common)
         else:
             ranges = zip(self._shares[:-1], self._shares[1:], strict=True)
-            for done in [self._pool.submit(_run, first, last, *common) for first, last in ranges]:
+            for done in [self._pool.submit(run, first, last, *common) for first, last in ranges]:
                 done.result()
         return outputs
 
@@ -348,5 +344,5 @@ def _warm_up(arguments) -> None:
         _PATIENCE, lambda: print("compiling the fast engine; numba keeps the result for later runs", file=sys.stderr)
     )
     notice.start()
-    _run(0, 0, *arguments)
+    run(0, 0, *arguments)
     notice.cancel()

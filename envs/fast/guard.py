@@ -10,15 +10,17 @@ import numpy as np
 from numba import njit
 
 from envs.fast.collisions import is_near, overlap
+from envs.fast.compiled import compiled
 from envs.fast.floats import norm
 from envs.fast.network import heading_at
 from envs.fast.state import DIRECT, OBSTACLE
 from envs.highway import _same_frame, _to_lane_frame, road_through
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
-from shield.controller import Body, Command, shield_frame
+from shield.command import Command
+from shield.controller import Body, shield_frame
 from shield.geometry import PIECE_FIELDS
 from shield.pair import ROAD_USER
-from shield.response import MEMORY
+from shield.response import MEMORY, forget_safe
 
 OFF, MONITOR, OVERRIDE = range(3)
 
@@ -26,7 +28,7 @@ OFF, MONITOR, OVERRIDE = range(3)
 class Frames(NamedTuple):
     """Lane frames in which the shield measures. L lanes."""
 
-    pieces: np.ndarray  # `[P, 7]` pieces of the roads through all lanes
+    pieces: np.ndarray  # `[P, 6]` pieces of the roads through all lanes
     start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
     same: np.ndarray  # `[L, L]` no gap jumps between the two frames
 
@@ -39,6 +41,7 @@ class Watch(NamedTuple):
     wrecks: np.ndarray  # `[N]`
     own_lane: np.ndarray  # `[N]` does it drive inside a lane that runs its way
     users: np.ndarray  # `[N]` ROAD_USER
+    blank: np.ndarray  # `[1]` MEMORY of a first sight
 
 
 def compile_frames(network) -> Frames:
@@ -60,18 +63,25 @@ def no_frames() -> Frames:
 def make_watch(n):
     """Fresh working memory."""
     return Watch(
-        np.empty((n, 4)), np.empty((n, 3)), np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty(n, ROAD_USER)
+        np.empty((n, 4)),
+        np.empty((n, 3)),
+        np.empty(n, np.bool_),
+        np.empty(n, np.bool_),
+        np.empty(n, ROAD_USER),
+        np.zeros(1, MEMORY),
     )
 
 
-@njit
-def start_watch(episode, memory, before):
+@compiled
+def start_watch(episode, memory, before, watch):
     """Forget everything at the start of an episode."""
-    memory[:] = np.zeros(1, MEMORY)[0]
-    before[:] = np.nan
+    for i in range(len(memory)):
+        memory[i] = watch.blank[0]
+        before[i, 0] = before[i, 1] = np.nan
     episode.frame_lane = -1
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     episode.frames = episode.frames_overridden = 0
+    episode.dangerous_pairs = episode.broken_duties = 0
     episode.cost = 0.0
     episode.min_ttc = np.inf
     episode.blame = episode.blame_axes = episode.blame_frames = episode.ego_duty = episode.other_duty = 0
@@ -79,7 +89,7 @@ def start_watch(episode, memory, before):
     episode.ego_excess = episode.other_excess = 0.0
 
 
-@njit
+@compiled
 def start_tally(step):
     """Nothing has happened in this decision yet."""
     step.frames = step.overridden = step.limited = step.dangerous_pairs = step.broken_duties = 0
@@ -128,9 +138,7 @@ def watch_frame(cars, episode, memory, before, lanes, sight, frames, watch, sett
         settings.dt,
     )
     command = report.command if settings.overrides else wish
-    pairs, broken = judge_frame(
-        ego, users, memory, command, curvature, settings.ego, settings.other, settings.dt
-    )
+    pairs, broken = judge_frame(ego, users, memory, command, curvature, settings.ego, settings.other, settings.dt)
     steered = steering
     if command.slip != wish.slip:
         steered = np.arctan(2.0 * np.tan(command.slip))
@@ -148,12 +156,14 @@ def watch_frame(cars, episode, memory, before, lanes, sight, frames, watch, sett
         step.margin_lon, step.margin_lat = report.margin_lon, report.margin_lat
         step.partner = _car_of(report.partner, episode)
     step.response |= report.response
+    episode.dangerous_pairs += pairs
+    episode.broken_duties += broken
     episode.frames += 1
     episode.frames_overridden += report.overridden and settings.overrides
     episode.min_ttc = min(episode.min_ttc, report.ttc)
 
 
-@njit
+@compiled
 def _car_of(user, episode):
     """Index among the cars of an index among the others."""
     return user if user < episode.ego else user + 1
@@ -166,8 +176,7 @@ def _sense(cars, episode, memory, before, lanes, sight, frames, watch, settings)
     if ego.lane != episode.frame_lane:
         if episode.frame_lane >= 0 and not frames.same[episode.frame_lane, ego.lane]:
             for i in range(n - 1):
-                if memory[i].since == 0:
-                    memory[i] = np.zeros(1, MEMORY)[0]
+                forget_safe(memory[i])
         episode.frame_lane = ego.lane
     road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
     for i in range(n):
@@ -190,11 +199,12 @@ def _sense(cars, episode, memory, before, lanes, sight, frames, watch, settings)
         settings.dt,
         watch.users[:n],
     )
-    before[:n] = watch.poses[:n, :2]
+    for i in range(n):
+        before[i, 0], before[i, 1] = watch.poses[i, 0], watch.poses[i, 1]
     return curvature
 
 
-@njit
+@compiled
 def _in_own_lane(k, car, ego, lanes, sight):
     """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
     if np.cos(car.heading - ego.heading) > 0.0:
@@ -238,7 +248,7 @@ def _judge(cars, episode, memory, before, lanes, sight, frames, watch, settings)
             episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
 
 
-@njit
+@compiled
 def _weight(verdict):
     """Of several contacts at once, the one that weighs most against the ego counts."""
     if verdict == NOBODY:
@@ -250,7 +260,7 @@ def _weight(verdict):
     return 1 if verdict == OTHER else 0
 
 
-@njit
+@compiled
 def _touches(cars, k, ego, sight, dt):
     first, second = cars[min(k, ego)], cars[max(k, ego)]
     if not (first.checks or second.checks) or not is_near(first, second, dt):
@@ -259,7 +269,7 @@ def _touches(cars, k, ego, sight, dt):
     return touches or will_touch
 
 
-@njit
+@compiled
 def _nearest(cars, episode):
     ego, nearest, best = cars[episode.ego], -1, np.inf
     for k in range(episode.cars):
@@ -269,7 +279,7 @@ def _nearest(cars, episode):
     return nearest
 
 
-@njit
+@compiled
 def is_at_fault(blame):
     """Does a blame code charge the ego?"""
     return blame == 1 + EGO or blame == 1 + BOTH

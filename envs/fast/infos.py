@@ -71,6 +71,8 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
         },
         "override_share": steps["override_share"],
         "episode_cost": steps["episode_cost"],
+        "episode_dangerous_pairs": steps["episode_dangerous_pairs"],
+        "episode_broken_duties": steps["episode_broken_duties"],
         "min_ttc": steps["min_ttc"],
         "raw_reward": steps["raw_reward"],
     }
@@ -78,9 +80,7 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
 
 def info_of(infos: dict, e: int) -> dict:
     """Infos of one environment out of those of a batch, as plain Python values."""
-    info = {
-        key: info_of(values, e) if isinstance(values, dict) else values[e].item() for key, values in infos.items()
-    }
+    info = {key: info_of(values, e) if isinstance(values, dict) else values[e].item() for key, values in infos.items()}
     if info.get("blame") == "":
         info["blame_evidence"] = {}
     return info

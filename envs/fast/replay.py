@@ -36,9 +36,7 @@ def show(env, cars: np.ndarray, network: Network, episode: np.ndarray | None = N
     env.observation_type.observer_vehicle = env.action_type.controlled_vehicle = road.vehicles[ego]
     if episode is not None:
         env.time = float(episode["time"])
-        env.steps = int(episode["steps"]) * int(
-            env.config["simulation_frequency"] // env.config["policy_frequency"]
-        )
+        env.steps = int(episode["steps"]) * int(env.config["simulation_frequency"] // env.config["policy_frequency"])
         road.np_random.bit_generator.state = generator_state(episode)
 
 

@@ -1,6 +1,5 @@
 """Rewards and the ends of episodes."""
 
-
 from envs.fast.compiled import compiled
 from envs.fast.config import EXIT, HIGHWAY, MERGE, TWO_WAY
 from envs.fast.floats import clip, lmap

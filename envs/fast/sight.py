@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from envs.fast.compiled import compiled
+from envs.fast.compiled import compiled, merged
 from envs.fast.floats import wrap_to_pi
 from envs.fast.network import distance, heading_at, is_on_lane, local_coordinates
 
@@ -107,7 +107,7 @@ def line_up(n, lanes, order, sight):
         sight.count[k] = count
 
 
-@compiled
+@merged
 def _place(k, i, sight):
     """First member of lane `k` with the arc length of car `i` or more; the car itself if it is on it."""
     place = sight.rank[k, i]
@@ -124,7 +124,7 @@ def _place(k, i, sight):
     return low
 
 
-@compiled
+@merged
 def car_ahead(k, i, n, net, lanes, sight):
     """Nearest car ahead of car `i` on lane `k`, -1 = none. Of several side by side the last one."""
     if net.links.shape[1] > 1:
@@ -142,7 +142,7 @@ def car_ahead(k, i, n, net, lanes, sight):
     return -1
 
 
-@compiled
+@merged
 def car_behind(k, i, n, net, lanes, sight):
     """Nearest car behind car `i` on lane `k`, -1 = none. Of several side by side the first one."""
     if net.links.shape[1] > 1:

@@ -62,6 +62,8 @@ EPISODE = np.dtype(
         ("nominal_steering", "f8"),
         ("frames", "i4"),  # watched since reset
         ("frames_overridden", "i4"),
+        ("dangerous_pairs", "i4"),
+        ("broken_duties", "i4"),
         ("cost", "f8"),
         ("min_ttc", "f8"),  # [s]
         ("blame", "i4"),  # 0 before a contact, then 1 + index into `shield.blame.VERDICTS`
@@ -100,6 +102,8 @@ STEP = np.dtype(
         ("cost", "f8"),
         ("override_share", "f8"),
         ("episode_cost", "f8"),
+        ("episode_dangerous_pairs", "i4"),
+        ("episode_broken_duties", "i4"),
         ("min_ttc", "f8"),
         ("blame", "i4"),
         ("blame_partner", "i4"),
