@@ -9,21 +9,12 @@ from highway_env.vehicle.objects import Landmark
 
 from shield.blame import DUTIES, VERDICTS, Log, judge_contact, judge_frame
 from shield.command import Command
-from shield.compiled import compiled
 from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_STEER, Body, shield_frame
-from shield.geometry import (
-    ARC_START,
-    CURVATURE,
-    HEADING,
-    LENGTH,
-    PIECE_FIELDS,
-    extents_within,
-    locate,
-    wrap_angle,
-)
+from shield.geometry import ARC_START, LENGTH, PIECE_FIELDS, largest_half_extents, make_road, wrap_angle
+from shield.lane_frame import same_frame, to_lane_frame_all
 from shield.pair import ROAD_USER
 from shield.params import RSSParams, Rules
-from shield.response import LAT, LON, MEMORY, forget_safe
+from shield.response import LAT, LON, MEMORY, catch_up, forget_safe
 
 _JOIN = 0.5  # lane ends closer than this belong together [m]
 _CHAIN = 8  # lanes followed in either direction
@@ -111,7 +102,7 @@ def _neighbour(network, index, forward: bool):
 
 
 def road_through(network, index) -> np.ndarray:
-    """The road along a lane as `[K, 6]` pieces: the lane itself, what leads to it and what follows.
+    """The road along a lane as `[K, 8]` pieces: the lane itself, what leads to it and what follows.
 
     Arc length counts from the start of the lane `index`.
     """
@@ -129,37 +120,9 @@ def road_through(network, index) -> np.ndarray:
         for piece in _pieces_of(network.get_lane(lane_index)):
             rows.append((*piece, start))
             start += piece[LENGTH]
-    road = np.array(rows, dtype=float).reshape(-1, PIECE_FIELDS)
+    road = make_road(rows)
     road[:, ARC_START] -= offset
     return road
-
-
-def _same_frame(road: np.ndarray, other: np.ndarray) -> bool:
-    """Do two roads differ by a lateral shift at most? Then no gap jumps between them."""
-    straight = not (road[:, CURVATURE].any() or other[:, CURVATURE].any())
-    return straight and bool(np.ptp(np.concatenate([road[:, HEADING], other[:, HEADING]])) < 1e-9)
-
-
-@compiled
-def _to_lane_frame(road, poses, before, sizes, wrecks, own_lane, heading_bound, dt, out):
-    """Fill `out` `[N]` `ROAD_USER` from world poses `[N, 4]`; `before` `[N, 2]` is nan at first sight."""
-    curvature = 0.0
-    for i in range(len(poses)):
-        x, y, heading, speed = poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3]
-        s, lateral, lane_heading, curvature = locate(road, x, y)
-        psi = wrap_angle(heading - lane_heading)
-        cos, sin = np.cos(lane_heading), np.sin(lane_heading)
-        dx, dy = x - before[i, 0], y - before[i, 1]
-        seen = not np.isnan(dx)
-        along = (dx * cos + dy * sin) / dt if seen else speed * np.cos(psi)
-        u = (dy * cos - dx * sin) / dt if seen else speed * np.sin(psi)
-        bound = 1.0 if sizes[i, 2] == 0.0 else heading_bound
-        half_length, half_width = extents_within(sizes[i, 0], sizes[i, 1], psi, bound)
-        out[i].s, out[i].y, out[i].heading, out[i].speed = s, lateral, psi, speed
-        out[i].along, out[i].u = along, u
-        out[i].half_length, out[i].half_width = half_length, half_width
-        out[i].wreck, out[i].in_own_lane = wrecks[i], own_lane[i]
-    return curvature  # of the lane at the last pose
 
 
 # ---------------------------------------------------------------- one ego under the shield
@@ -195,6 +158,8 @@ class ShieldedEgo:
         self.seen = 0
         self.memory = np.zeros(0, MEMORY)
         self.before = np.zeros((0, 2))
+        self.boxes = np.zeros((0, 4))
+        self.last = (np.zeros(1, ROAD_USER)[0], np.zeros(0, ROAD_USER))  # ego and others on the frame before
         self.roads: dict = {}
         self.lane_index = None
         self.road = np.zeros((0, PIECE_FIELDS))
@@ -222,11 +187,13 @@ class ShieldedEgo:
         vehicle, settings = self.vehicle, self.settings
         # meta-actions compute a new command on every frame, a continuous one persists
         nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
+        steering = float(nominal["steering"])  # single precision where the agent's action is
         users, ego, curvature = self._sense()
-        wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(nominal["steering"]))))
+        wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
         report = shield_frame(
             ego,
             users,
+            *self.last,
             self.memory,
             wish,
             Body(*self.body, curvature),
@@ -239,14 +206,15 @@ class ShieldedEgo:
         pairs, broken = judge_frame(
             ego, users, self.memory, command, curvature, settings.ego, settings.other, settings.dt
         )
-        steering = float(nominal["steering"])
+        steered = steering
         if command != wish:
             if command.slip != wish.slip:
-                steering = float(np.arctan(2.0 * np.tan(command.slip)))
-            vehicle.action = {"steering": steering, "acceleration": command.acceleration}
+                steered = float(np.arctan(2.0 * np.tan(command.slip)))
+            vehicle.action = {"steering": steered, "acceleration": command.acceleration}
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
-        self._count(report, pairs, broken, command.acceleration - wish.acceleration, steering - nominal["steering"])
+        self.last = (ego, users)
+        self._count(report, pairs, broken, command.acceleration - wish.acceleration, steered - steering)
         if self.record is not None:
             self.record.append(Frame(ego, users, tuple(self.keys), command, curvature, self.jumped, self.poses))
 
@@ -283,27 +251,16 @@ class ShieldedEgo:
         road = vehicle.road
         others = [v for v in road.vehicles if v is not vehicle]
         others += [o for o in road.objects if not isinstance(o, Landmark) and o.collidable]
-        if others != self.others:
+        if others != self.others or len(self.before) != len(others) + 1:
             self._follow(others)
         self._choose_frame()
 
         everybody = [*others, vehicle]
         poses = np.array([(*v.position, v.heading, v.speed) for v in everybody], dtype=float)
-        sizes = np.array([(v.LENGTH, v.WIDTH, hasattr(v, "action")) for v in everybody], dtype=float)
-        wrecks = np.array([v.crashed or not hasattr(v, "action") for v in everybody])
-        own_lane = np.array([self._in_own_lane(v) for v in everybody])
         out = np.zeros(len(everybody), ROAD_USER)
-        curvature = _to_lane_frame(
-            self.road,
-            poses,
-            self.before,
-            sizes,
-            wrecks,
-            own_lane,
-            settings.rules.heading_bound,
-            settings.dt,
-            out,
-        )
+        out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in others]
+        out["in_own_lane"] = [self._in_own_lane(v) for v in everybody]
+        curvature = to_lane_frame_all(self.road, poses, self.before, self.boxes, settings.dt, out)
         self.before = poses[:, :2]
         self.poses = poses
         return out[:-1], out[-1], curvature
@@ -313,6 +270,7 @@ class ShieldedEgo:
         old = {id(other): i for i, other in enumerate(self.others)}
         memory = np.zeros(len(others), MEMORY)
         before = np.full((len(others) + 1, 2), np.nan)
+        last = np.zeros(len(others), ROAD_USER)
         keys = []
         for i, other in enumerate(others):
             k = old.get(id(other))
@@ -320,11 +278,13 @@ class ShieldedEgo:
                 keys.append(self.seen)
                 self.seen += 1
             else:
-                memory[i], before[i] = self.memory[k], self.before[k]
+                memory[i], before[i], last[i] = self.memory[k], self.before[k], self.last[1][k]
                 keys.append(self.keys[k])
         if len(self.before):
             before[-1] = self.before[-1]
         self.others, self.memory, self.before, self.keys = others, memory, before, keys
+        self.last = (self.last[0], last)
+        self.boxes = np.array([_box(v, self.settings.rules.heading_bound) for v in [*others, self.vehicle]])
 
     def _choose_frame(self) -> None:
         """Measure along the lane the ego is on. Where that moves everybody at once, danger is not their doing."""
@@ -335,7 +295,7 @@ class ShieldedEgo:
         if index not in self.roads:
             self.roads[index] = road_through(self.vehicle.road.network, index)
         road = self.roads[index]
-        if self.lane_index is not None and not _same_frame(self.road, road):
+        if self.lane_index is not None and not same_frame(self.road, road):
             self.jumped = True
             for memory in self.memory:
                 forget_safe(memory)
@@ -367,9 +327,11 @@ class ShieldedEgo:
         if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
         settings = self.settings
+        rules = (settings.ego, settings.other, settings.rules, settings.dt)
+        for i in touching:
+            catch_up(self.memory[i], self.last[0], self.last[1][i], *rules)
         verdicts = [
-            judge_contact(ego, users[i], self.memory[i], settings.ego, settings.other, settings.rules, settings.dt)
-            for i in touching
+            judge_contact(ego, users[i], self.memory[i], *rules) for i in touching
         ]
         # several at once: the one that weighs most against the ego counts
         weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
@@ -396,6 +358,12 @@ class ShieldedEgo:
             return False
         touching, will_touch, _ = first._is_colliding(second, self.settings.dt)
         return bool(touching or will_touch)
+
+
+def _box(user, heading_bound: float) -> tuple[float, float, float, float]:
+    """Length and width, and the largest half extents that its driver may use; obstacles have no driver [m]."""
+    bound = heading_bound if hasattr(user, "action") else 1.0
+    return user.LENGTH, user.WIDTH, *largest_half_extents(user.LENGTH, user.WIDTH, bound)
 
 
 def response_name(response: int) -> str:

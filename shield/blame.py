@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shield.command import Command
-from shield.compiled import compiled
+from shield.compiled import compiled, compiled_for_arrays
 from shield.kinematics import forward_reach, speed_envelope, travel
 from shield.lateral import approach_no_credit, lateral_euler_margin
 from shield.longitudinal import euler_margin
@@ -86,8 +86,8 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
     """
     step = ahead * dt
     if owes(memory, LON):
-        travel_ego = memory.travel_ego + ego.speed * np.cos(ego.heading) * step
-        travel_other = memory.travel_other + user.speed * np.cos(user.heading) * step
+        travel_ego = memory.travel_ego + ego.speed * ego.cos * step
+        travel_other = memory.travel_other + user.speed * user.cos * step
         longer_ego = ego.half_length - memory.half_length_ego
         longer_other = user.half_length - memory.half_length_other
         # danger from the start is counted from its first sample, any other from the safe one before
@@ -119,10 +119,10 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
             )
             _blame_other(memory, duty, excess)
     if owes(memory, LAT):
-        used = memory.approach_ego + max(memory.side * ego.speed * np.sin(ego.heading), 0.0) * step
+        used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * step
         share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
         _blame_ego(memory, TOO_CLOSE, used - share - slack)
-        used = memory.approach_other + max(-memory.side * user.speed * np.sin(user.heading), 0.0) * step
+        used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * step
         # a driver may already use the first frame's growth on it; mu has room for that
         first_frame = other_params.a_lat_max_accel * dt**2
         _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt) - first_frame)
@@ -233,7 +233,7 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     Args:
       ego, user: `ROAD_USER` records at the sample at which contact exists or is predicted for the
         next frame, before any impact displaces the cars.
-      memory: `MEMORY` record after the previous sample.
+      memory: `MEMORY` record after the previous sample, nothing skipped (`response.catch_up`).
 
     Returns:
       `Verdict`. "inherited": never safe since first sight and the ego responded properly all the
@@ -285,7 +285,7 @@ class Audit(NamedTuple):
     excess: np.ndarray  # `[T, N]` how much it was broken by
 
 
-@compiled
+@compiled_for_arrays
 def audit(log, ego_params, other_params, rules, dt):
     """Replay a log and say for every dangerous pair-frame whether the ego kept its duty (Defs. 4, 8, 10).
 

@@ -5,7 +5,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+import numpy as np
+from numba import njit, types
+from numba.extending import overload
 
 
 def fingerprint(*more: Path) -> str:
@@ -17,13 +19,42 @@ def fingerprint(*more: Path) -> str:
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """`numba.njit` with a cache on disk that knows what a function is made of.
+    """`numba.njit` for what handles numbers, records and views of arrays but allocates nothing.
 
-    Compiled functions contain the ones they call, but numba's cache looks at the time stamp of the
-    function's own file alone: after an edit elsewhere it would go on with the old code. A shield must
-    never do that, so any change in the package compiles everything anew.
+    numba need not count references to the arrays then, which would cost more than the work itself.
+
+    The cache on disk knows what a function is made of: compiled functions contain the ones they
+    call, but numba looks at the time stamp of the function's own file alone, and after an edit
+    elsewhere it would go on with the old code. A shield must never do that, so any change in the
+    package compiles everything anew.
     """
-    dispatcher: Any = njit(cache=True)(function)
+    return _stamped(njit(cache=True, error_model="numpy", _nrt=False)(function))
+
+
+def merged(function: Callable[..., Any]) -> Any:
+    """`compiled`, and merged into its callers: handing over tables by value would cost more than the work."""
+    return _stamped(njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)(function))
+
+
+def compiled_for_arrays(function: Callable[..., Any]) -> Any:
+    """`compiled` for what also takes whole arrays, or makes them."""
+    return _stamped(njit(cache=True, error_model="numpy")(function))
+
+
+def _stamped(dispatcher: Any) -> Any:
+    function = dispatcher.py_func
     stamp = fingerprint(Path(function.__code__.co_filename))
     dispatcher._cache._cache_file._source_stamp = stamp
     return dispatcher
+
+
+def choose(condition: Any, this: Any, that: Any) -> Any:
+    """`np.where`, which for floats would put each of its arguments into an array in compiled code."""
+    return np.where(condition, this, that)
+
+
+@overload(choose)
+def _choose(condition, this, that):
+    if isinstance(condition, types.Boolean):
+        return lambda condition, this, that: this if condition else that
+    return lambda condition, this, that: np.where(condition, this, that)

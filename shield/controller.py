@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shield.command import Command
-from shield.compiled import compiled
-from shield.pair import assess, toward
-from shield.response import Bounds, merge, owes_braking, owes_lateral_stop, remember
+from shield.compiled import compiled, merged
+from shield.geometry import signed_gap
+from shield.pair import assess, leading_speed, least_margin, own_share, toward
+from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, remember
 
 
 class Report(NamedTuple):
@@ -26,6 +27,8 @@ class Report(NamedTuple):
 
 RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN = 1, 2, 4
 
+_FAR = 1e-6  # a pair that is safe by more than this is far apart: more than rounding can change [m]
+_STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
 _STANDSTILL = 1e-6  # below this speed nothing moves sideways [m/s]
 
 
@@ -38,8 +41,11 @@ class Body(NamedTuple):
 
 
 @compiled
-def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, rules, dt):
+def shield_frame(ego, users, ego_before, users_before, memory, nominal, body, ego_params, other_params, rules, dt):
     """Restrict the ego's nominal command to what RSS permits on this frame.
+
+    Pairs that are far apart cannot bound the command and are not looked at. If one comes near later,
+    the sample before is taken in first, so nothing depends on that.
 
     Acceleration is clipped after the ego's own controller; an override brakes directly. Steering is
     chosen so that the lateral speed of this frame, the one that the new heading commits to, course and
@@ -48,6 +54,7 @@ def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, ru
     Args:
       ego: `ROAD_USER` record.
       users: `[N]` `ROAD_USER` records of everybody else.
+      ego_before, users_before: the same on the frame before; zeros on the first.
       memory: `[N]` `MEMORY` records, changed in place.
       nominal: `Command` of the ego's own controller.
       body: `Body` of the ego.
@@ -62,7 +69,13 @@ def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, ru
     bounds = free
     worst, partner, margin_lon, margin_lat, ttc = np.inf, -1, np.inf, np.inf, np.inf
     dangerous, response = False, 0
+    share_ego = own_share(ego, ego_params, dt)
     for i in range(len(users)):
+        margin = least_margin(ego, users[i], share_ego, ego_params, other_params, rules, dt)
+        if memory[i].since == 0 and margin > max(worst, _FAR) and not _may_be_next(ego, users[i], ttc, rules):
+            memory[i].skipped = True
+            continue
+        catch_up(memory[i], ego_before, users_before[i], ego_params, other_params, rules, dt)
         pair = assess(ego, users[i], ego_params, other_params, rules, dt)
         remember(memory[i], pair, ego, users[i], dt)
         bounds = merge(bounds, memory[i], pair, ego_params, rules, dt)
@@ -78,7 +91,7 @@ def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, ru
             ttc = min(ttc, max(pair.gap_lon, 0.0) / (pair.v_ego - pair.v_other))
 
     limited = restrict(nominal, free, ego, body, rules, dt)
-    command = restrict(nominal, bounds, ego, body, rules, dt)
+    command = restrict(nominal, bounds, ego, body, rules, dt) if bounds != free else limited
     overridden = command != limited
     return Report(
         command,
@@ -91,6 +104,15 @@ def shield_frame(ego, users, memory, nominal, body, ego_params, other_params, ru
         response,
         ttc,
     )
+
+
+@merged
+def _may_be_next(ego, user, ttc, rules):
+    """May this user, driving the same way, be ahead in the way of the ego and nearer in time than `ttc` [s]?"""
+    if user.s < ego.s or signed_gap(user.y - ego.y, ego.half_width, user.half_width) >= 0.0:
+        return False
+    closing = ego.speed - leading_speed(user, rules)
+    return closing > 0.0 and not signed_gap(user.s - ego.s, ego.half_length, user.half_length) >= ttc * closing
 
 
 @compiled
@@ -131,6 +153,9 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     psi, gain = ego.heading, v * dt / body.half_wheelbase
     turned = body.curvature * v * dt  # the lane turns under the car during the frame ...
     drift = 0.5 * turned * v  # ... and curves away from its tangent [m/s]
+    psi_next = psi + gain * np.sin(slip) - turned
+    if _is_permitted(psi + slip, psi_next, v, v_next, drift, bounds, rules) and abs(slip) <= body.max_slip:
+        return slip
     neutral = _straightening_slip(psi, turned, drift, gain, v, bounds)
 
     # lateral speed of this frame: -left <= v sin(psi + slip) - drift <= right
@@ -147,6 +172,21 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     high = min(high, max(_arcsin((psi_high - psi + turned) / gain), neutral))
     low, high = max(low, -body.max_slip), min(high, body.max_slip)
     return min(max(slip, low), high)
+
+
+@merged
+def _is_permitted(course, psi_next, v, v_next, drift, bounds, rules):
+    """Do course and next heading [rad] keep all bounds? The bounds in closed form, without solving for the slip."""
+    if abs(course) >= _STEEP or abs(psi_next) >= _STEEP:
+        return False
+    sin, sin_next = np.sin(course), np.sin(psi_next)
+    steepest = rules.heading_bound
+    return (
+        -bounds.left <= v * sin - drift <= bounds.right
+        and -bounds.left_next <= v_next * sin_next <= bounds.right_next
+        and abs(sin) <= steepest
+        and abs(sin_next) <= steepest
+    )
 
 
 @compiled

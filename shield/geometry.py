@@ -1,17 +1,23 @@
 """Lane frames and oriented boxes (Section 3.2 of the paper, metric lateral coordinates).
 
-A road is a chain of pieces of constant curvature, `[K, 6]` float64, one row per piece:
-start x, start y, start heading, curvature (positive turns right), length, arc length at the start.
-y points to the right of the driving direction.
+A road is a chain of pieces of constant curvature, `[K, 8]` float64, one row per piece:
+start x, start y, start heading, curvature (positive turns right), length, arc length at the start,
+cosine and sine of the start heading. y points to the right of the driving direction.
 """
 
 import numpy as np
 
-from shield.compiled import compiled
+from shield.compiled import compiled, merged
 
-PIECE_FIELDS = 6
-X, Y, HEADING, CURVATURE, LENGTH, ARC_START = range(PIECE_FIELDS)
+PIECE_FIELDS = 8
+X, Y, HEADING, CURVATURE, LENGTH, ARC_START, COS, SIN = range(PIECE_FIELDS)
 _STRAIGHT = 1e-9  # curvature below which a piece is straight [1/m]
+
+
+def make_road(pieces) -> np.ndarray:
+    """A road `[K, 8]` from the first six columns of its pieces."""
+    rows = np.asarray(pieces, dtype=float).reshape(-1, COS)
+    return np.column_stack([rows, np.cos(rows[:, HEADING]), np.sin(rows[:, HEADING])])
 
 
 @compiled
@@ -20,12 +26,11 @@ def wrap_angle(angle):
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-@compiled
+@merged
 def _on_piece(piece, x, y):
     """Arc length from the start of a piece, signed lateral offset [m] and heading of the lane there [rad]."""
     dx, dy = x - piece[X], y - piece[Y]
-    cos, sin = np.cos(piece[HEADING]), np.sin(piece[HEADING])
-    along, across = dx * cos + dy * sin, -dx * sin + dy * cos
+    along, across = dx * piece[COS] + dy * piece[SIN], -dx * piece[SIN] + dy * piece[COS]
     kappa = piece[CURVATURE]
     if abs(kappa) < _STRAIGHT:
         return along, across, piece[HEADING]
@@ -44,31 +49,40 @@ def locate(road, x, y):
     The piece whose lane is nearest counts; beyond both ends of the chain the road goes on straight.
 
     Args:
-      road: `[K, 6]` pieces.
+      road: `[K, 8]` pieces.
       x, y: position [m].
 
     Returns:
       (s, y, heading, curvature): arc length and signed lateral offset [m], heading of the lane
       [rad] and its curvature [1/m] there.
     """
+    s, lateral, k, heading = nearest_piece(road, x, y)
+    return s, lateral, heading, road[k, CURVATURE] if k >= 0 else 0.0
+
+
+@merged
+def nearest_piece(road, x, y):
+    """As `locate`, but with the index of the piece; -1 on the tangent beyond a curved end."""
+    if len(road) == 1 and abs(road[0, CURVATURE]) < _STRAIGHT:
+        s, lateral, heading = _on_piece(road[0], x, y)
+        return road[0, ARC_START] + s, lateral, 0, heading
     best = np.inf
-    s_best, y_best, heading_best, kappa_best = 0.0, 0.0, 0.0, 0.0
+    s_best, y_best, heading_best, k_best = 0.0, 0.0, 0.0, -1
     last = len(road) - 1
     for k in range(last + 1):
-        piece = road[k]
+        piece, nearest = road[k], k
         s, lateral, heading = _on_piece(piece, x, y)
-        kappa = piece[CURVATURE]
         before, after = s < 0.0, s > piece[LENGTH]
         outside = -s if before else (s - piece[LENGTH] if after else 0.0)
-        if abs(kappa) >= _STRAIGHT and ((before and k == 0) or (after and k == last)):
-            s, lateral, heading = _on_tangent(piece, x, y, after)
-            kappa = 0.0
         free_end = (before and k == 0) or (after and k == last)
+        if free_end and abs(piece[CURVATURE]) >= _STRAIGHT:
+            s, lateral, heading = _on_tangent(piece, x, y, after)
+            nearest = -1
         distance = abs(lateral) + (0.0 if free_end else outside)
         if distance < best:
             best = distance
-            s_best, y_best, heading_best, kappa_best = piece[ARC_START] + s, lateral, heading, kappa
-    return s_best, y_best, heading_best, kappa_best
+            s_best, y_best, heading_best, k_best = piece[ARC_START] + s, lateral, heading, nearest
+    return s_best, y_best, k_best, heading_best
 
 
 @compiled
@@ -92,26 +106,31 @@ def half_extents(length, width, heading):
       length, width: of the box [m].
       heading: relative to the lane [rad].
     """
-    cos, sin = np.abs(np.cos(heading)), np.abs(np.sin(heading))
+    return turned_half_extents(length, width, np.cos(heading), np.sin(heading))
+
+
+@merged
+def turned_half_extents(length, width, cos, sin):
+    """`half_extents` by the cosine and sine of the heading."""
+    cos, sin = np.abs(cos), np.abs(sin)
     return 0.5 * (length * cos + width * sin), 0.5 * (length * sin + width * cos)
 
 
 @compiled
-def extents_within(length, width, heading, heading_bound):
-    """Half extents [m] that hold for every angle to the lane within the bound, and for `heading` beyond it.
+def largest_half_extents(length, width, heading_bound):
+    """Largest half extents [m] of a box at any angle to the lane within a bound.
 
     Args:
-      heading_bound: sine of the largest angle a driver may have to the lane; 1 = no bound, the
-        extents are those of the moment.
+      heading_bound: sine of the largest angle a driver may have to the lane; 1 = no bound, then
+        nothing is promised and both are 0.
     """
-    along, across = half_extents(length, width, heading)
     if heading_bound >= 1.0:
-        return along, across
+        return 0.0, 0.0
     # a box is longest along its diagonal, and widest too
     bound, diagonal = np.arcsin(heading_bound), np.arctan2(width, length)
-    along_bound, _ = half_extents(length, width, np.minimum(bound, diagonal))
-    _, across_bound = half_extents(length, width, np.minimum(bound, 0.5 * np.pi - diagonal))
-    return np.maximum(along, along_bound), np.maximum(across, across_bound)
+    along, _ = half_extents(length, width, np.minimum(bound, diagonal))
+    _, across = half_extents(length, width, np.minimum(bound, 0.5 * np.pi - diagonal))
+    return along, across
 
 
 @compiled

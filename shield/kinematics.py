@@ -5,37 +5,37 @@ All functions take floats or arrays that broadcast, in SI units, and are compile
 
 import numpy as np
 
-from shield.compiled import compiled
+from shield.compiled import compiled_for_arrays
 
+_TINY = 1e-300  # stands in for a positive divisor where the dividend is 0
 
-@compiled
+@compiled_for_arrays
 def speed_after_response(v, rho, a, v_cap):
     """Speed after accelerating at `a` for `rho`, never beyond `v_cap` [m/s]. A faster car keeps its speed."""
     return np.minimum(v + a * rho, np.maximum(v_cap, v))
 
 
-@compiled
+@compiled_for_arrays
 def response_distance(v, rho, a, v_cap):
     """Distance covered while accelerating at `a` for `rho`, speed limited to `v_cap` [m]."""
-    v_rho = speed_after_response(v, rho, a, v_cap)
-    ramp = np.where(a > 0.0, (v_rho - v) / np.where(a > 0.0, a, 1.0), rho)  # until the cap is reached
-    return 0.5 * (v + v_rho) * ramp + v_rho * (rho - ramp)
+    cut = v + a * rho - speed_after_response(v, rho, a, v_cap)  # speed that the cap takes away
+    return v * rho + 0.5 * a * rho**2 - cut**2 / (2 * np.maximum(a, _TINY))
 
 
-@compiled
+@compiled_for_arrays
 def stopping_distance(v, b):
     """Distance to rest from speed `v` >= 0 with braking `b` > 0 [m]."""
     return v**2 / (2 * b)
 
 
-@compiled
+@compiled_for_arrays
 def reach(v, rho, a, b, v_cap):
     """Distance covered by "accelerate at `a` for `rho`, then brake at `b` to rest" from v >= 0 [m]."""
     v_rho = speed_after_response(v, rho, a, v_cap)
     return response_distance(v, rho, a, v_cap) + stopping_distance(v_rho, b)
 
 
-@compiled
+@compiled_for_arrays
 def forward_reach(v, rho, a, b, v_cap=np.inf):
     """Largest displacement ever reached in the positive direction, for any sign of `v` [m].
 
@@ -48,7 +48,7 @@ def forward_reach(v, rho, a, b, v_cap=np.inf):
     return np.maximum(end, 0.0)
 
 
-@compiled
+@compiled_for_arrays
 def speed_envelope(tau, v, rho, a, b, v_cap=np.inf):
     """Fastest speed a driver may have `tau` after the danger threshold [m/s].
 
@@ -59,7 +59,7 @@ def speed_envelope(tau, v, rho, a, b, v_cap=np.inf):
     return np.maximum(v_response - b * np.maximum(tau - rho, 0.0), 0.0)
 
 
-@compiled
+@compiled_for_arrays
 def travel(tau, v, rho, a, b, v_cap=np.inf):
     """Distance covered `tau` after the danger threshold at the speeds of `speed_envelope` [m]."""
     v_rho = speed_after_response(v, rho, a, v_cap)
@@ -68,7 +68,7 @@ def travel(tau, v, rho, a, b, v_cap=np.inf):
     return response + v_rho * t_brake - 0.5 * b * t_brake**2
 
 
-@compiled
+@compiled_for_arrays
 def frames_for(duration, dt):
     """A duration rounded up to whole frames of length `dt`, in frames (condition C2)."""
     return np.ceil(duration / dt - 1e-9)

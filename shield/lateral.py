@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from shield.compiled import compiled
-from shield.kinematics import forward_reach
+from shield.compiled import choose, compiled_for_arrays
 
 
-@compiled
+@compiled_for_arrays
 def d_min_lateral(u_left, u_right, left, right, mode="no_credit"):
     """Smallest safe lateral gap between two cars side by side (Def. 6, Lemma 4) [m].
 
@@ -33,12 +32,12 @@ def d_min_lateral(u_left, u_right, left, right, mode="no_credit"):
       ValueError: unknown mode.
     """
     w_left, w_right = 1.0 * u_left, -1.0 * u_right  # speeds toward the other
-    mu = 0.5 * (left.mu + right.mu)
     if mode == "no_credit":
-        return mu + approach_no_credit(w_left, left) + approach_no_credit(w_right, right)
+        return d_min_no_credit(w_left, w_right, left, right)
     elif mode == "pair":
-        return mu + np.maximum(_approach_at_rest(w_left, left) + _approach_at_rest(w_right, right), 0.0)
-    elif mode == "sup":
+        return d_min_of_pair(w_left, w_right, left, right)
+    mu = 0.5 * (left.mu + right.mu)
+    if mode == "sup":
         return mu + _largest_approach(w_left, w_right, left, right)
     elif mode == "paper":
         return mu + np.maximum(_approach_as_printed(w_left, left) + _approach_as_printed(w_right, right), 0.0)
@@ -46,25 +45,38 @@ def d_min_lateral(u_left, u_right, left, right, mode="no_credit"):
         raise ValueError("mode of d_min_lateral: expected 'no_credit', 'pair', 'sup' or 'paper'")
 
 
-@compiled
+@compiled_for_arrays
+def d_min_no_credit(w_1, w_2, car_1, car_2):
+    """`d_min_lateral` in the reading "no_credit", by the speeds of both cars toward each other [m]."""
+    return 0.5 * (car_1.mu + car_2.mu) + approach_no_credit(w_1, car_1) + approach_no_credit(w_2, car_2)
+
+
+@compiled_for_arrays
+def d_min_of_pair(w_1, w_2, car_1, car_2):
+    """`d_min_lateral` in the reading "pair", by the speeds of both cars toward each other [m]."""
+    approach = _approach_at_rest(w_1, car_1) + _approach_at_rest(w_2, car_2)
+    return 0.5 * (car_1.mu + car_2.mu) + np.maximum(approach, 0.0)
+
+
+@compiled_for_arrays
 def approach_no_credit(w, car):
     """Farthest a car with speed `w` toward its neighbour can still come, receding not credited [m]."""
-    return forward_reach(np.maximum(w, 0.0), car.response_time, car.a_lat_max_accel, car.a_lat_min_brake)
+    return _approach_at_rest(np.maximum(w, 0.0), car)
 
 
-@compiled
+@compiled_for_arrays
 def _approach_at_rest(w, car):
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
     return w * rho + 0.5 * a * rho**2 + np.maximum(w + a * rho, 0.0) ** 2 / (2 * b)
 
 
-@compiled
+@compiled_for_arrays
 def _approach_as_printed(w, car):
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
     return w * rho + 0.5 * a * rho**2 + (w + a * rho) ** 2 / (2 * b)
 
 
-@compiled
+@compiled_for_arrays
 def _approach_at(t, w, car):
     """Displacement toward the neighbour after `t` of "accelerate, then brake"; a receding car halts at rho."""
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
@@ -74,18 +86,18 @@ def _approach_at(t, w, car):
     return w * t_response + 0.5 * a * t_response**2 + v * t_brake - 0.5 * b * t_brake**2
 
 
-@compiled
+@compiled_for_arrays
 def _phase(t, w, car):
     """Speed and acceleration toward the neighbour just after `t`."""
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
     v = w + a * rho
     braking = (t >= rho) & (v > b * (t - rho))
-    speed = np.where(t < rho, w + a * t, np.where(braking, v - b * (t - rho), 0.0))
-    acceleration = np.where(t < rho, a, np.where(braking, -b, 0.0))
+    speed = choose(t < rho, w + a * t, choose(braking, v - b * (t - rho), 0.0))
+    acceleration = choose(t < rho, a, choose(braking, -b, 0.0))
     return speed, acceleration
 
 
-@compiled
+@compiled_for_arrays
 def _largest_approach(w_left, w_right, left, right):
     """Supremum over time of the sum of both approaches, never below 0 [m].
 
@@ -101,13 +113,13 @@ def _largest_approach(w_left, w_right, left, right):
         v_l, a_l = _phase(start, w_left, left)
         v_r, a_r = _phase(start, w_right, right)
         v, a = v_l + v_r, a_l + a_r
-        vertex = start + np.where((v > 0.0) & (a < 0.0), v / np.where(a < 0.0, -a, 1.0), 0.0)
+        vertex = start + choose((v > 0.0) & (a < 0.0), v / choose(a < 0.0, -a, 1.0), 0.0)
         for t in (start, vertex):
             largest = np.maximum(largest, _approach_at(t, w_left, left) + _approach_at(t, w_right, right))
     return largest
 
 
-@compiled
+@compiled_for_arrays
 def lateral_euler_margin(w, car, dt):
     """What frames of length `dt` need on top of one car's continuous lateral approach [m] (condition C5).
 
@@ -120,7 +132,7 @@ def lateral_euler_margin(w, car, dt):
     return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8 + frame_start
 
 
-@compiled
+@compiled_for_arrays
 def mu_lateral_velocity(time, path, k, mu):
     """mu-lateral velocity at sample `k` of a recorded lateral path (Def. 5) [m/s]. Offline: it looks ahead.
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from shield.compiled import compiled
+from shield.compiled import choose, compiled_for_arrays
 from shield.kinematics import forward_reach, reach, response_distance, speed_after_response, stopping_distance
 
 
-@compiled
+@compiled_for_arrays
 def d_min_same_direction(v_rear, v_front, rear, front, mode="exact"):
     """Smallest safe gap to a car ahead driving the same way (Def. 1, Lemma 2) [m].
 
@@ -28,18 +28,30 @@ def d_min_same_direction(v_rear, v_front, rear, front, mode="exact"):
     Raises:
       ValueError: unknown mode.
     """
-    rho = rear.response_time
-    d_rear = reach(v_rear, rho, rear.a_max_accel, rear.a_min_brake, rear.v_cap)
-    d = np.maximum(d_rear - stopping_distance(v_front, front.a_max_brake), 0.0)
     if mode == "exact":
-        if rear.a_min_brake > front.a_max_brake:
-            d = np.maximum(d, _closest_while_braking(v_rear, v_front, rear, front))
-    elif mode != "lemma2":
+        return d_min_following(v_rear, v_front, rear, front)
+    elif mode == "lemma2":
+        return _d_min_lemma_2(v_rear, v_front, rear, front)
+    else:
         raise ValueError("mode of d_min_same_direction: expected 'exact' or 'lemma2'")
-    return d + rear.standstill_gap
 
 
-@compiled
+@compiled_for_arrays
+def d_min_following(v_rear, v_front, rear, front):
+    """`d_min_same_direction` in the mode "exact" [m]."""
+    d = _d_min_lemma_2(v_rear, v_front, rear, front)
+    if rear.a_min_brake > front.a_max_brake:
+        d = np.maximum(d, _closest_while_braking(v_rear, v_front, rear, front) + rear.standstill_gap)
+    return d
+
+
+@compiled_for_arrays
+def _d_min_lemma_2(v_rear, v_front, rear, front):
+    d_rear = reach(v_rear, rear.response_time, rear.a_max_accel, rear.a_min_brake, rear.v_cap)
+    return np.maximum(d_rear - stopping_distance(v_front, front.a_max_brake), 0.0) + rear.standstill_gap
+
+
+@compiled_for_arrays
 def _closest_while_braking(v_rear, v_front, rear, front):
     """Room needed at the moment both have the same speed; -inf where they never have while rolling (hole H1)."""
     rho = rear.response_time
@@ -51,10 +63,10 @@ def _closest_while_braking(v_rear, v_front, rear, front):
     d_response = response_distance(v_rear, rho, rear.a_max_accel, rear.v_cap)
     d_front = v_front * rho - 0.5 * b_front * rho**2
     needed = d_response - d_front + closing**2 / (2 * (b_rear - b_front))
-    return np.where(both_roll, needed, -np.inf)
+    return choose(both_roll, needed, -np.inf)
 
 
-@compiled
+@compiled_for_arrays
 def d_min_opposite_direction(v_correct, v_wrong, correct, wrong):
     """Smallest safe gap between two cars driving toward each other (Def. 2, Lemma 3) [m].
 
@@ -73,7 +85,7 @@ def d_min_opposite_direction(v_correct, v_wrong, correct, wrong):
     return d_correct + d_wrong + np.maximum(correct.standstill_gap, wrong.standstill_gap)
 
 
-@compiled
+@compiled_for_arrays
 def d_min_longitudinal(v_rear, v_front, facing, rear, front, b_rear, b_front):
     """Smallest safe gap for any signs of speed (floats only) [m].
 
@@ -89,13 +101,13 @@ def d_min_longitudinal(v_rear, v_front, facing, rear, front, b_rear, b_front):
         its own lane, else `a_min_brake`.
     """
     if not facing and v_rear >= 0.0 and v_front >= 0.0:
-        return d_min_same_direction(v_rear, v_front, rear, front)
+        return d_min_following(v_rear, v_front, rear, front)
     d_rear = forward_reach(v_rear, rear.response_time, rear.a_max_accel, b_rear, rear.v_cap)
     d_front = forward_reach(-v_front, front.response_time, front.a_max_accel, b_front, front.v_cap)
     return d_rear + d_front + np.maximum(rear.standstill_gap, front.standstill_gap)
 
 
-@compiled
+@compiled_for_arrays
 def euler_margin(closing, b, dt):
     """What explicit Euler needs on top of a continuous longitudinal distance [m] (condition C5).
 
@@ -111,7 +123,7 @@ def euler_margin(closing, b, dt):
     return np.maximum(closing, 0.0) * dt / 2 + b * dt**2 / 8
 
 
-@compiled
+@compiled_for_arrays
 def is_safe_longitudinally(gap, d_min):
     """Def. 1/2 as a predicate on signed bumper-to-bumper gaps: overlapping cars are never safe (hole H4)."""
     return (gap > 0.0) & (gap >= d_min)

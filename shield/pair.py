@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled
+from shield.compiled import compiled, merged
 from shield.geometry import signed_gap
-from shield.lateral import approach_no_credit, d_min_lateral, lateral_euler_margin
+from shield.kinematics import reach, stopping_distance
+from shield.lateral import approach_no_credit, d_min_no_credit, d_min_of_pair, lateral_euler_margin
 from shield.longitudinal import d_min_longitudinal, euler_margin, is_safe_longitudinally
 
 # One road user in the lane frame of the ego. SI units; lateral values positive to the right.
@@ -15,6 +16,8 @@ ROAD_USER = np.dtype(
         ("s", "f8"),  # arc length of the centre
         ("y", "f8"),  # lateral offset of the centre
         ("heading", "f8"),  # relative to the lane
+        ("cos", "f8"),  # of the heading
+        ("sin", "f8"),
         ("speed", "f8"),  # along its own heading, negative in reverse
         ("along", "f8"),  # speed along the lane over the last frame, slip included
         ("u", "f8"),  # speed across the lane over the last frame
@@ -48,16 +51,16 @@ class Pair(NamedTuple):
     w_other: float
 
 
-@compiled
+@merged
 def toward(side, user):
     """Lateral speed toward `side`: the larger of the last frame's and the one the heading commits to [m/s].
 
     The slip angle acts at once, so the speed of the last frame alone hides what the next one does.
     """
-    return max(side * user.u, side * user.speed * np.sin(user.heading))
+    return max(side * user.u, side * user.speed * user.sin)
 
 
-@compiled
+@merged
 def assess(ego, user, ego_params, other_params, rules, dt):
     """Evaluate both axes of one pair on one frame.
 
@@ -71,7 +74,7 @@ def assess(ego, user, ego_params, other_params, rules, dt):
       `Pair`.
     """
     ego_is_rear = user.s >= ego.s
-    opposite = np.cos(user.heading) < 0.0
+    opposite = user.cos < 0.0
     side = 1.0 if user.y >= ego.y else -1.0
     gap_lon = signed_gap(user.s - ego.s, ego.half_length, user.half_length)
     gap_lat = signed_gap(user.y - ego.y, ego.half_width, user.half_width)
@@ -79,12 +82,13 @@ def assess(ego, user, ego_params, other_params, rules, dt):
     v_ego, v_other, d_lon = _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt)
 
     w_ego, w_other = toward(side, ego), toward(-side, user)
-    reading = "no_credit" if rules.no_credit else "pair"
-    d_lat = d_min_lateral(w_ego, -w_other, ego_params, other_params, reading)
+    if rules.no_credit:
+        d_lat = d_min_no_credit(w_ego, w_other, ego_params, other_params)
+    else:
+        d_lat = d_min_of_pair(w_ego, w_other, ego_params, other_params)
     w_ego, w_other = max(w_ego, 0.0), max(w_other, 0.0)
     if rules.discretisation_margin:
-        d_lat += lateral_euler_margin(w_ego, ego_params, dt)
-        d_lat += sampled_approach(w_other, other_params, dt) - approach_no_credit(w_other, other_params)
+        d_lat += lateral_euler_margin(w_ego, ego_params, dt) + sampling_margin(w_other, other_params, dt)
     d_lat += rules.overlap_margin
 
     return Pair(
@@ -104,29 +108,80 @@ def assess(ego, user, ego_params, other_params, rules, dt):
     )
 
 
+@merged
+def own_share(user, params, dt):
+    """What a follower may need of the distance of Def. 1: (its way to rest, its margins) [m].
+
+    The way is inf for a car that reverses or is turned round.
+    """
+    if user.speed < 0.0 or user.cos <= 0.0:
+        return np.inf, 0.0
+    b = params.a_min_brake
+    way = reach(user.speed, params.response_time, params.a_max_accel, b, params.v_cap)
+    return way, params.standstill_gap + euler_margin(user.speed, b, dt)
+
+
+@merged
+def least_margin(ego, user, share_ego, ego_params, other_params, rules, dt):
+    """Lower bound of `Pair.margin_lon` at a fraction of the price of `assess` [m]; -inf where none is known.
+
+    Args:
+      ego, user, ego_params, other_params, rules, dt: as in `assess`.
+      share_ego: `own_share` of the ego.
+    """
+    if user.speed < 0.0 or user.cos <= 0.0 or share_ego[0] == np.inf:
+        return -np.inf
+    if user.s >= ego.s:
+        way, margins = share_ego
+        way -= _credit(leading_speed(user, rules), ego_params, other_params)
+    else:
+        way, margins = own_share(user, other_params, dt)
+        way -= _credit(leading_speed(ego, rules), other_params, ego_params)
+    return signed_gap(user.s - ego.s, ego.half_length, user.half_length) - (max(way, 0.0) + margins)
+
+
+@merged
+def _credit(v_front, rear, front):
+    """The leader's own way to rest [m]; 0 if the cars may be closest before they stand."""
+    return stopping_distance(v_front, front.a_max_brake) if rear.a_min_brake <= front.a_max_brake else 0.0
+
+
+@merged
+def leading_speed(user, rules):
+    """Least speed along the lane that a leader is expected to have [m/s].
+
+    It may turn within the heading bound while it brakes, and a wreck may stop on the spot.
+    """
+    shortest = np.sqrt(1.0 - rules.heading_bound**2) if rules.heading_bound < 1.0 else 1.0
+    v = user.speed * min(user.cos, shortest)
+    return min(v, 0.0) if user.wreck else v
+
+
 @compiled
 def sampled_approach(w, car, dt):
     """Farthest a compliant car may come, sampled every `dt`, from speed `w` toward its neighbour [m]."""
     w = max(w, 0.0)
-    return approach_no_credit(w, car) + w * dt / 2 + car.a_lat_min_brake * dt**2 / 8
+    return approach_no_credit(w, car) + sampling_margin(w, car, dt)
 
 
-@compiled
+@merged
+def sampling_margin(w, car, dt):
+    """What sampling every `dt` adds to that, w >= 0 [m]."""
+    return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8
+
+
+@merged
 def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt):
     """Speeds along the lane as Def. 1 or 2 must assume them, and the required gap."""
-    # A follower may turn back into the lane at any time: its whole speed counts. A leader may turn
-    # within the heading bound while it brakes, and a wreck may stop on the spot.
-    shortest = np.sqrt(1.0 - rules.heading_bound**2) if rules.heading_bound < 1.0 else 1.0
-    v_ego = _fastest(ego) if ego_is_rear else ego.speed * min(np.cos(ego.heading), shortest)
+    # A follower may turn back into the lane at any time: its whole speed counts.
+    v_ego = _fastest(ego) if ego_is_rear else leading_speed(ego, rules)
     if opposite:
         v_other = -user.speed
-    elif ego_is_rear:
-        v_other = user.speed * min(np.cos(user.heading), shortest)
+        if user.wreck and ego_is_rear:
+            v_other = min(v_other, 0.0)
     else:
-        v_other = _fastest(user)
+        v_other = leading_speed(user, rules) if ego_is_rear else _fastest(user)
     v_ego, v_other = _settled(v_ego), _settled(v_other)
-    if user.wreck and ego_is_rear:
-        v_other = min(v_other, 0.0)
 
     b_ego, b_other = head_on_braking(opposite, user.in_own_lane, ego_params, other_params)
     if ego_is_rear:
@@ -146,7 +201,7 @@ def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, ru
 @compiled
 def _fastest(user):
     """Speed along the lane that a follower must be expected to have [m/s]: one turned round may reverse forward."""
-    return max(user.speed, user.speed * np.cos(user.heading))
+    return max(user.speed, user.speed * user.cos)
 
 
 @compiled

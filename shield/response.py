@@ -8,14 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled
+from shield.compiled import compiled, merged
 from shield.kinematics import speed_envelope
+from shield.pair import assess
 
 NEVER, LON, LAT = 0, 1, 2  # axes that were safe at the last safe sample; LON | LAT is both
 
 MEMORY = np.dtype(
     [
-        ("age", "i8"),  # frames since first sight, 0 = not seen yet
+        ("age", "i8"),  # samples taken in since first sight, 0 = not seen yet
+        ("skipped", "?"),  # the last sample was safe beyond doubt and is not taken in yet
         ("since", "i8"),  # frames since the last safe sample; 0 = safe now
         ("axes", "i8"),  # axes safe at that sample; NEVER = danger from the start
         # roles and state at the threshold t_b (at first sight where danger was there from the start)
@@ -69,7 +71,7 @@ def step_threshold(axes, since, safe_lon, safe_lat):
     return axes, since + 1
 
 
-@compiled
+@merged
 def remember(memory, pair, ego, user, dt):
     """Carry one pair's memory over to this sample, in place."""
     memory.axes, memory.since = step_threshold(memory.axes, memory.since, pair.safe_lon, pair.safe_lat)
@@ -93,6 +95,15 @@ def remember(memory, pair, ego, user, dt):
     memory.acceleration_other = (user.speed - memory.speed_other) / dt if memory.age > 0 else 0.0
     memory.speed_other = user.speed
     memory.age += 1
+    memory.skipped = False
+
+
+@compiled
+def catch_up(memory, ego_before, user_before, ego_params, other_params, rules, dt):
+    """Take in the last sample, if it was skipped, in place. It is the threshold of a danger that begins now."""
+    if memory.skipped:
+        pair = assess(ego_before, user_before, ego_params, other_params, rules, dt)
+        remember(memory, pair, ego_before, user_before, dt)
 
 
 @compiled
@@ -102,7 +113,7 @@ def forget_safe(memory):
     If the pair is unsafe now, that is inherited danger: nobody's doing, answered on both axes.
     """
     if memory.since == 0:
-        memory.age, memory.axes = 0, NEVER
+        memory.age, memory.axes, memory.skipped = 0, NEVER, False
 
 
 @compiled
@@ -235,7 +246,7 @@ CUT_IN_SPEED = 0.1  # a car ahead counts as cutting in when it comes closer at t
 CUT_IN_GAP = 0.3  # ... or is nearer than this across the lane [m]
 
 
-@compiled
+@merged
 def owes_braking(memory, pair, rules):
     """Must the ego brake for this pair? Returns the reason: 0 none, 1 Def. 4, 2 behind a cut-in (hole H6)."""
     if memory.since == 0:
@@ -254,7 +265,7 @@ def owes_lateral_stop(memory, rules):
     return rules.lateral and rules.memory and owes(memory, LAT)
 
 
-@compiled
+@merged
 def merge(bounds, memory, pair, params, rules, dt):
     """Tighten the bounds by what is owed to one pair.
 

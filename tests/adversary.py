@@ -12,9 +12,9 @@ import numpy as np
 
 from shield.blame import judge_contact, judge_frame
 from shield.command import Command
-from shield.compiled import compiled
+from shield.compiled import compiled_for_arrays as compiled
 from shield.controller import Body, always_on, restrict, shield_frame
-from shield.geometry import extents_within
+from shield.geometry import half_extents, largest_half_extents
 from shield.kinematics import frames_for
 from shield.pair import ROAD_USER, assess
 from shield.params import PRESETS, RSSParams, Rules
@@ -193,8 +193,11 @@ def _sideways(car, side):
 
 @compiled
 def _extents(car, w):
-    bound = 0.0 if car.length == OBSTACLE_SIZE else np.arcsin(w.table.heading_bound)
-    return extents_within(car.length, car.width, car.heading, bound)
+    along, across = half_extents(car.length, car.width, car.heading)
+    if car.length == OBSTACLE_SIZE:
+        return along, across
+    largest = largest_half_extents(car.length, car.width, w.table.heading_bound)
+    return max(along, largest[0]), max(across, largest[1])
 
 
 @compiled
@@ -412,6 +415,7 @@ def _place(rng, car, ego, where, squeeze, w):
 def _as_seen(car, user, w):
     """The `ROAD_USER` record of a car, as the shield gets it."""
     user.s, user.y, user.heading, user.speed = car.x, car.y, car.heading, car.speed
+    user.cos, user.sin = np.cos(car.heading), np.sin(car.heading)
     user.u, user.along = car.u, car.along
     user.half_length, user.half_width = _extents(car, w)
     user.in_own_lane, user.wreck = car.own_lane, car.wreck
@@ -421,12 +425,13 @@ def _as_seen(car, user, w):
 
 
 @compiled
-def _shielded(nominal, ego, seen, users, memory, w, result):
+def _shielded(nominal, ego, seen, users, last, memory, w, result):
     """The shield's command, less what `w` takes away from it."""
     if w.forgetful:
         for i in range(w.others):
             memory[i].age = memory[i].since = memory[i].axes = 0
-    report = shield_frame(seen, users, memory, nominal, BODY, w.ego, w.other, w.rules, w.dt)
+            memory[i].skipped = False
+    report = shield_frame(seen, users, last[w.others], last, memory, nominal, BODY, w.ego, w.other, w.rules, w.dt)
     result.overridden += report.overridden
     result.cut_ins += (report.response & 4) != 0
     a, slip = report.command
@@ -496,7 +501,7 @@ def episode(rng, w, result, film):
     for i in range(1 + w.others):
         cars[i].hold, cars[i].throttle = w.frames if squeeze else 0, 2
 
-    users, seen = np.zeros(w.others, ROAD_USER), np.zeros(1, ROAD_USER)
+    users, seen, last = np.zeros(w.others, ROAD_USER), np.zeros(1, ROAD_USER), np.zeros(w.others + 1, ROAD_USER)
     memory, record, law = np.zeros(w.others, MEMORY), np.zeros(w.others, MEMORY), np.zeros(w.others, LAW)
     pending = np.zeros((w.latency + 1, 2))
     result.contact, result.gap_lon, result.gap_lat = -1, np.inf, np.inf
@@ -513,7 +518,10 @@ def episode(rng, w, result, film):
         slowest = -MAX_SPEED if may_reverse else 0.0
         command = Command(min(max(a, (slowest - ego.speed) / w.dt), (MAX_SPEED - ego.speed) / w.dt), slip)
         if w.shielded:
-            command = _shielded(command, ego, seen[0], users, memory, w, result)
+            command = _shielded(command, ego, seen[0], users, last, memory, w, result)
+            for i in range(w.others):
+                last[i] = users[i]
+            last[w.others] = seen[0]
         pending[frame % len(pending), 0], pending[frame % len(pending), 1] = command
         late = (frame + 1) % len(pending)
         command = Command(max(pending[late, 0], (slowest - ego.speed) / w.dt), pending[late, 1])

@@ -183,7 +183,7 @@ def test_behind_a_cut_in_nobody_brakes_there_but_the_ego_does_here():
     ego, other = become(ONE, CAR, lon=20.0), become(TWO, CAR, lon=20.0, lat=-1.0)
     users = np.zeros(2, ROAD_USER)
     users["half_length"], users["half_width"], users["speed"], users["in_own_lane"] = 2.5, 1.0, 20.0, True
-    users["s"], users["u"] = [0.0, 25.0], [0.0, -1.0]
+    users["s"], users["u"], users["cos"] = [0.0, 25.0], [0.0, -1.0], 1.0
     memory = np.zeros(1, MEMORY)[0]
     for time, gap in ((1, 9.0), (2, 0.5)):
         lon, right = judged(checker, time, ego, other, (BEHIND, 20.0), (ON_THE_LEFT, gap))

@@ -14,7 +14,7 @@ import pytest
 
 from shield.blame import VERDICTS, judge_contact, judge_frame
 from shield.command import Command
-from shield.geometry import half_extents, locate
+from shield.geometry import half_extents, locate, make_road
 from shield.kinematics import forward_reach, reach, stopping_distance
 from shield.lateral import approach_no_credit, d_min_lateral, mu_lateral_velocity
 from shield.longitudinal import (
@@ -273,7 +273,7 @@ def oriented_extent(psi):
 
 def def29_semantic(x, y):
     # lateral values are lane widths of 4 m, positive outward; here metres, positive to the right, which is inward
-    circle = np.array([[50.0, 0.0, np.pi / 2, 1 / 50, 50.0 * np.pi, 0.0, 2.0]])
+    circle = make_road([[50.0, 0.0, np.pi / 2, 1 / 50, 50.0 * np.pi, 0.0]])
     s, lateral, _, _ = locate(circle, float(x), float(y))
     return [s, -lateral / 4.0]
 
@@ -301,6 +301,7 @@ def drive_to_contact(extra, b_front, a_rear, b_rear, ego_is_rear, dt=0.01):
     cars = np.zeros(2, ROAD_USER)
     cars["half_length"], cars["half_width"], cars["in_own_lane"] = 2.5, 1.0, True
     cars["speed"] = cars["along"] = 20.0
+    cars["cos"] = 1.0
     rear, front = cars[0], cars[1]
     front["s"] = 5.0 + d_min_same_direction(20.0, 20.0, CAR, CAR) + extra
     ego, users = (rear, cars[1:]) if ego_is_rear else (front, cars[:1])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shield.geometry import PIECE_FIELDS, extents_within, half_extents, locate, signed_gap, wrap_angle
+from shield.geometry import half_extents, largest_half_extents, locate, make_road, signed_gap, wrap_angle
 
 STRAIGHT, LEFT, RIGHT = 0.0, -1 / 40, 1 / 25  # curvatures [1/m]; positive turns right, y points right
 ROADS = {
@@ -24,14 +24,13 @@ def build(pieces, x=3.0, y=-7.0, heading=0.4):
         turn = 1j * kappa * length
         position += np.exp(1j * heading) * (length if kappa == 0.0 else length * (np.exp(turn) - 1.0) / turn)
         heading, arc = heading + kappa * length, arc + length
-    assert len(rows[0]) == PIECE_FIELDS
-    return np.array(rows)
+    return make_road(rows)
 
 
 def at(road, s, y):
     """Position and lane heading at arc length `s` and lateral offset `y`; straight on beyond both ends."""
     k = int(np.clip(np.searchsorted(road[:, 5], s, side="right") - 1, 0, len(road) - 1))
-    x0, y0, heading, kappa, length, arc = road[k]
+    x0, y0, heading, kappa, length, arc = road[k, :6]
     along = s - arc
     curved = float(np.clip(along, 0.0, length))
     position = complex(x0, y0)
@@ -49,20 +48,20 @@ def at(road, s, y):
 
 def test_a_straight_lane_by_hand():
     # along the y axis of the plane: what is right of it has smaller x
-    road = np.array([[2.0, 0.0, np.pi / 2, 0.0, 100.0, 1000.0]])
+    road = make_road([[2.0, 0.0, np.pi / 2, 0.0, 100.0, 1000.0]])
     assert locate(road, -1.0, 30.0) == pytest.approx((1030.0, 3.0, np.pi / 2, 0.0))
 
 
 def test_a_right_turn_around_the_origin_by_hand():
     # radius 50 about the origin, from (50, 0) towards (0, 50): the centre is on the right
-    road = np.array([[50.0, 0.0, np.pi / 2, 1 / 50, 50.0 * np.pi, 0.0]])
+    road = make_road([[50.0, 0.0, np.pi / 2, 1 / 50, 50.0 * np.pi, 0.0]])
     assert locate(road, 0.0, 51.0) == pytest.approx((25.0 * np.pi, -1.0, np.pi, 1 / 50))
     assert locate(road, 36.0, 36.0)[:2] == pytest.approx((12.5 * np.pi, 50.0 - 36.0 * np.sqrt(2.0)))
 
 
 def test_a_left_turn_by_hand():
     # radius 50 about (0, -50), from the origin along x: the centre is on the left
-    road = np.array([[0.0, 0.0, 0.0, -1 / 50, 60.0, 0.0]])
+    road = make_road([[0.0, 0.0, 0.0, -1 / 50, 60.0, 0.0]])
     x, y = 52.0 * np.sin(0.5), -50.0 + 52.0 * np.cos(0.5)
     assert locate(road, x, y) == pytest.approx((25.0, 2.0, -0.5, -1 / 50))
 
@@ -147,23 +146,16 @@ def test_half_extents_are_where_the_corners_are():
         assert half_extents(length, width, heading) == pytest.approx(corners_reach(length, width, heading), abs=1e-12)
 
 
-@pytest.mark.parametrize("bound", [0.0, 0.05, 0.1, 0.3])
-@pytest.mark.parametrize("heading", [0.0, -0.04, 0.2, 1.0])
-def test_extents_within_a_bound_hold_for_every_angle_up_to_it_and_for_the_heading(bound, heading):
-    along, across = extents_within(5.0, 2.0, heading, np.sin(bound))
-    for angle in [*np.linspace(-bound, bound, 101), heading]:
-        at_angle = corners_reach(5.0, 2.0, angle)
-        assert along >= at_angle[0] - 1e-12 and across >= at_angle[1] - 1e-12
+@pytest.mark.parametrize("bound", [0.0, 0.05, 0.1, 0.3, 0.6, 1.5])
+def test_the_largest_half_extents_hold_for_every_angle_up_to_the_bound_and_are_reached(bound):
+    along, across = largest_half_extents(5.0, 2.0, np.sin(bound))
+    reached = np.array([corners_reach(5.0, 2.0, angle) for angle in np.linspace(-bound, bound, 4001)])
+    assert [along, across] == pytest.approx(reached.max(axis=0), abs=1e-6)
+    assert (reached <= [along + 1e-12, across + 1e-12]).all()
 
 
-def test_without_a_bound_the_extents_are_those_of_the_moment():
-    assert extents_within(5.0, 2.0, 0.3, 1.0) == pytest.approx(corners_reach(5.0, 2.0, 0.3))
-
-
-def test_extents_within_a_wide_bound_include_the_diagonal():
-    # 5 x 2 m is longest along the lane at atan(2 / 5) = 0.38: half the diagonal, 2.6926 m
-    along, _ = extents_within(5.0, 2.0, 0.0, np.sin(0.6))
-    assert along >= 0.5 * np.hypot(5.0, 2.0) - 1e-12
+def test_without_a_bound_no_half_extents_are_promised():
+    assert largest_half_extents(5.0, 2.0, 1.0) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(("distance", "gap"), [(10.0, 5.5), (-10.0, 5.5), (4.5, 0.0), (3.0, -1.5), (0.0, -4.5)])

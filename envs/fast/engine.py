@@ -10,7 +10,6 @@ from threading import Timer
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from envs.fast.collisions import collide
 from envs.fast.compiled import compiled, kernel
@@ -22,6 +21,7 @@ from envs.fast.guard import (
     OFF,
     OVERRIDE,
     Frames,
+    Past,
     check_contact,
     compile_frames,
     is_at_fault,
@@ -40,6 +40,7 @@ from envs.fast.sight import line_up, make_sight, project, sort_along_x, update_l
 from envs.fast.state import CAR, EPISODE, STEP
 from envs.highway import Settings
 from shield.params import PRESETS, Rules
+from shield.pair import ROAD_USER
 from shield.response import MEMORY
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
@@ -70,7 +71,8 @@ class Batch(NamedTuple):
     episodes: np.ndarray  # `[E]` EPISODE
     order: np.ndarray  # `[E, N]` indices sorted by x
     memory: np.ndarray  # `[E, N]` MEMORY of the shield, `[E, 0]` without one
-    before: np.ndarray  # `[E, N, 2]` positions one frame ago, for the shield
+    before: np.ndarray  # `[E, N, 2]` see `guard.Past`
+    seen: np.ndarray  # `[E, 2, N]`
 
 
 class Inputs(NamedTuple):
@@ -101,14 +103,14 @@ class Film(NamedTuple):
 
 
 @compiled
-def _restart(cars, episode, order, memory, before, world, sight, watch, mode, step, out):
+def _restart(cars, episode, order, past, world, sight, watch, mode, step, out):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
     make_scene(cars, episode, order, world.network, lanes, config, world.target_speeds, world.lane_odds)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
     project(cars, episode.cars, lanes, sight)
     sort_along_x(cars, episode.cars, order)
-    start_watch(episode, memory, before, watch)
+    start_watch(episode, past, watch)
     start_tally(step)
     rate(cars, episode, -1, lanes, sight, config, step)
     step.raw_reward = 0.0
@@ -151,8 +153,8 @@ def _report(cars, episode, mode, cost, step):
         step.other_duty, step.other_excess = episode.other_duty, episode.other_excess
 
 
-@njit
-def _advance(e, cars, episode, order, memory, before, world, sight, watch, settings, mode, inputs, film, step):
+@compiled
+def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode, inputs, film, step):
     """One decision of one environment, frame by frame."""
     config, net = world.config[0], world.network
     lanes = net.lanes
@@ -171,7 +173,7 @@ def _advance(e, cars, episode, order, memory, before, world, sight, watch, setti
         line_up(episode.cars, lanes, order, sight)
         decide(cars, episode, net, lanes, sight, config)
         if mode != OFF:
-            watch_frame(cars, episode, memory, before, lanes, sight, world.frames, watch, settings, step)
+            watch_frame(cars, episode, past, lanes, sight, world.frames, watch, settings, step)
         move(cars, episode.vehicles, config.dt, config.max_speed, config.min_speed)
         project(cars, episode.cars, lanes, sight)
         update_lanes(cars, episode.vehicles, lanes, sight)
@@ -184,7 +186,7 @@ def _advance(e, cars, episode, order, memory, before, world, sight, watch, setti
     episode.steps += 1
     cost = 0.0
     if mode != OFF:
-        check_contact(cars, episode, memory, before, lanes, sight, world.frames, watch, settings)
+        check_contact(cars, episode, past, lanes, sight, world.frames, watch, settings)
         if step.broken_duties > 0 or (not had_contact and is_at_fault(episode.blame)):
             cost = 1.0
     return cost
@@ -196,10 +198,10 @@ def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalt
     config, lanes = world.config[0], world.network.lanes
     n = batch.cars.shape[1]
     sight = make_sight(len(lanes), n, config.speeds, config.lanes, config.times)
-    watch = make_watch(n)
+    watch = make_watch(settings.rules.heading_bound)
     for e in range(first, last):
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
-        memory, before, observation = batch.memory[e], batch.before[e], outputs.observations[e]
+        past, observation = Past(batch.memory[e], batch.before[e], batch.seen[e]), outputs.observations[e]
         outputs.rewards[e] = 0.0
         outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
@@ -208,10 +210,10 @@ def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalt
             _report(cars, episode, mode, 0.0, step)
             continue
         if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
-            _restart(cars, episode, order, memory, before, world, sight, watch, mode, step, observation)
+            _restart(cars, episode, order, past, world, sight, watch, mode, step, observation)
             continue
         cost = _advance(
-            e, cars, episode, order, memory, before, world, sight, watch, settings, mode, inputs, film, step
+            e, cars, episode, order, past, world, sight, watch, settings, mode, inputs, film, step
         )
         _see(cars, episode, world, sight, observation)
         reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
@@ -226,7 +228,7 @@ def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalt
         if episode.ended and autoreset == SAME_STEP:
             outputs.final_observations[e, :] = observation
             outputs.final_steps[e] = step
-            _restart(cars, episode, order, memory, before, world, sight, watch, mode, step, observation)
+            _restart(cars, episode, order, past, world, sight, watch, mode, step, observation)
 
 
 class Engine:
@@ -275,6 +277,7 @@ class Engine:
             np.zeros((num_envs, n), np.int32),
             np.zeros((num_envs, watched), MEMORY),
             np.zeros((num_envs, watched, 2)),
+            np.zeros((num_envs, 2, watched), ROAD_USER),
         )
         self.film = Film(np.full(num_envs, -1, np.int32), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
         self._size = int(np.prod(scenario.observation_space.shape))

@@ -10,17 +10,18 @@ import numpy as np
 from numba import njit
 
 from envs.fast.collisions import is_near, overlap
-from envs.fast.compiled import compiled
+from envs.fast.compiled import compiled, merged
 from envs.fast.floats import norm
 from envs.fast.network import heading_at
-from envs.fast.state import DIRECT, OBSTACLE
-from envs.highway import _same_frame, _to_lane_frame, road_through
+from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, OBSTACLE, OBSTACLE_SIZE
+from envs.highway import road_through
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
 from shield.command import Command
 from shield.controller import Body, shield_frame
-from shield.geometry import PIECE_FIELDS
+from shield.geometry import PIECE_FIELDS, largest_half_extents
+from shield.lane_frame import same_frame, to_lane_frame
 from shield.pair import ROAD_USER
-from shield.response import MEMORY, forget_safe
+from shield.response import MEMORY, catch_up, forget_safe
 
 OFF, MONITOR, OVERRIDE = range(3)
 
@@ -28,19 +29,23 @@ OFF, MONITOR, OVERRIDE = range(3)
 class Frames(NamedTuple):
     """Lane frames in which the shield measures. L lanes."""
 
-    pieces: np.ndarray  # `[P, 6]` pieces of the roads through all lanes
+    pieces: np.ndarray  # `[P, 8]` pieces of the roads through all lanes
     start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
     same: np.ndarray  # `[L, L]` no gap jumps between the two frames
 
 
-class Watch(NamedTuple):
-    """Working memory of the shield for N road users, the ego last."""
+class Past(NamedTuple):
+    """What the shield remembers of one environment with N road users, the ego last."""
 
-    poses: np.ndarray  # `[N, 4]` x, y, heading, speed
-    sizes: np.ndarray  # `[N, 3]` length, width, is it a vehicle
-    wrecks: np.ndarray  # `[N]`
-    own_lane: np.ndarray  # `[N]` does it drive inside a lane that runs its way
-    users: np.ndarray  # `[N]` ROAD_USER
+    memory: np.ndarray  # `[N]` MEMORY
+    before: np.ndarray  # `[N, 2]` positions one frame ago, nan at first sight [m]
+    seen: np.ndarray  # `[2, N]` ROAD_USER of the last two frames; `episode.turn` is the row of the last one
+
+
+class Watch(NamedTuple):
+    """Tables of the shield."""
+
+    boxes: np.ndarray  # `[2, 4]` length, width, largest half extents of a car and of an obstacle [m]
     blank: np.ndarray  # `[1]` MEMORY of a first sight
 
 
@@ -50,7 +55,7 @@ def compile_frames(network) -> Frames:
     return Frames(
         np.concatenate(roads),
         np.cumsum([0, *map(len, roads)]),
-        np.array([[_same_frame(a, b) for b in roads] for a in roads]),
+        np.array([[same_frame(a, b) for b in roads] for a in roads]),
     )
 
 
@@ -60,25 +65,22 @@ def no_frames() -> Frames:
 
 
 @njit
-def make_watch(n):
-    """Fresh working memory."""
-    return Watch(
-        np.empty((n, 4)),
-        np.empty((n, 3)),
-        np.empty(n, np.bool_),
-        np.empty(n, np.bool_),
-        np.empty(n, ROAD_USER),
-        np.zeros(1, MEMORY),
-    )
+def make_watch(heading_bound):
+    """Tables for a `heading_bound` as in `Rules`."""
+    boxes = np.zeros((2, 4))
+    boxes[0, 0], boxes[0, 1] = CAR_LENGTH, CAR_WIDTH
+    boxes[0, 2], boxes[0, 3] = largest_half_extents(CAR_LENGTH, CAR_WIDTH, heading_bound)
+    boxes[1, 0], boxes[1, 1] = OBSTACLE_SIZE, OBSTACLE_SIZE
+    return Watch(boxes, np.zeros(1, MEMORY))
 
 
 @compiled
-def start_watch(episode, memory, before, watch):
+def start_watch(episode, past, watch):
     """Forget everything at the start of an episode."""
-    for i in range(len(memory)):
-        memory[i] = watch.blank[0]
-        before[i, 0] = before[i, 1] = np.nan
-    episode.frame_lane = -1
+    for i in range(len(past.memory)):
+        past.memory[i] = watch.blank[0]
+        past.before[i, 0] = past.before[i, 1] = np.nan
+    episode.frame_lane, episode.turn = -1, 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     episode.frames = episode.frames_overridden = 0
     episode.dangerous_pairs = episode.broken_duties = 0
@@ -98,37 +100,39 @@ def start_tally(step):
     step.partner, step.response = -1, 0
 
 
-@njit
-def watch_frame(cars, episode, memory, before, lanes, sight, frames, watch, settings, step):
+@merged
+def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step):
     """Restrict the ego's command on one frame, unless it has had its contact.
 
     Args:
       cars: `[N]` CAR, all commands chosen.
       episode: EPISODE.
-      memory: `[N]` MEMORY of the other road users.
-      before: `[N, 2]` last positions in the order of `Watch`, nan at first sight.
+      past: `Past`.
       lanes: `[L]` LANE.
       sight: this frame's.
       frames: `Frames` of the network.
-      watch: working memory.
+      watch: `Watch`.
       settings: `envs.highway.Settings`.
       step: STEP, the tally is kept there.
     """
-    if check_contact(cars, episode, memory, before, lanes, sight, frames, watch, settings):
+    if check_contact(cars, episode, past, lanes, sight, frames, watch, settings):
         return
     car = cars[episode.ego]
     if car.kind == DIRECT:
         acceleration, steering = episode.nominal_acceleration, episode.nominal_steering
     else:
         acceleration, steering = car.acceleration, car.steering
-    curvature = _sense(cars, episode, memory, before, lanes, sight, frames, watch, settings)
+    curvature = _sense(cars, episode, past, lanes, sight, frames, watch, settings)
     n = episode.cars - 1
-    ego, users = watch.users[n], watch.users[:n]
+    now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
+    ego, users, memory = now[n], now[:n], past.memory[:n]
     wish = Command(acceleration, np.arctan(0.5 * np.tan(steering)))
     max_slip = np.arctan(np.tan(np.pi / 3) / 2)
     report = shield_frame(
         ego,
         users,
+        then[n],
+        then[:n],
         memory,
         wish,
         Body(car.length / 2, max_slip, curvature),
@@ -169,65 +173,67 @@ def _car_of(user, episode):
     return user if user < episode.ego else user + 1
 
 
-@njit
-def _sense(cars, episode, memory, before, lanes, sight, frames, watch, settings):
-    """Fill `watch.users` with everybody in the ego's lane frame, the ego last; returns the lane's curvature."""
+@compiled
+def _sense(cars, episode, past, lanes, sight, frames, watch, settings):
+    """Take in everybody in the ego's lane frame, the ego last; returns the lane's curvature."""
     n, ego = episode.cars, cars[episode.ego]
+    episode.turn = 1 - episode.turn
+    users, before = past.seen[episode.turn], past.before
     if ego.lane != episode.frame_lane:
         if episode.frame_lane >= 0 and not frames.same[episode.frame_lane, ego.lane]:
             for i in range(n - 1):
-                forget_safe(memory[i])
+                forget_safe(past.memory[i])
         episode.frame_lane = ego.lane
     road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
+    curvature = 0.0
     for i in range(n):
         k = episode.ego if i == n - 1 else _car_of(i, episode)
-        car = cars[k]
-        watch.poses[i, 0], watch.poses[i, 1] = car.x, car.y
-        watch.poses[i, 2], watch.poses[i, 3] = car.heading, car.speed
-        vehicle = car.kind != OBSTACLE
-        watch.sizes[i, 0], watch.sizes[i, 1], watch.sizes[i, 2] = car.length, car.width, 1.0 if vehicle else 0.0
-        watch.wrecks[i] = car.crashed or not vehicle
-        watch.own_lane[i] = _in_own_lane(k, car, ego, lanes, sight)
-    curvature = _to_lane_frame(
-        road,
-        watch.poses[:n],
-        before[:n],
-        watch.sizes[:n],
-        watch.wrecks[:n],
-        watch.own_lane[:n],
-        settings.rules.heading_bound,
-        settings.dt,
-        watch.users[:n],
-    )
-    for i in range(n):
-        before[i, 0], before[i, 1] = watch.poses[i, 0], watch.poses[i, 1]
-    return curvature
+        car, user = cars[k], users[i]
+        box = watch.boxes[1 if car.kind == OBSTACLE else 0]
+        curvature = to_lane_frame(
+            road,
+            car.x,
+            car.y,
+            car.heading,
+            car.speed,
+            car.cos,
+            car.sin,
+            before[i, 0],
+            before[i, 1],
+            box,
+            settings.dt,
+            user,
+        )
+        user.wreck = k != episode.ego and (car.crashed or car.kind == OBSTACLE)
+        user.in_own_lane = _in_own_lane(k, car, ego, lanes, sight)
+        before[i, 0], before[i, 1] = car.x, car.y
+    return curvature  # of the lane at the ego, the last one
 
 
 @compiled
 def _in_own_lane(k, car, ego, lanes, sight):
     """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
-    if np.cos(car.heading - ego.heading) > 0.0:
+    if car.cos * ego.cos + car.sin * ego.sin > 0.0:
         return True
     lane, s, lateral = lanes[car.lane], sight.s[car.lane, k], sight.lateral[car.lane, k]
     along = np.cos(car.heading - heading_at(lane, s)) > 0.0
     return along and abs(lateral) <= (lane.width - car.width) / 2
 
 
-@njit
-def check_contact(cars, episode, memory, before, lanes, sight, frames, watch, settings):
+@compiled
+def check_contact(cars, episode, past, lanes, sight, frames, watch, settings):
     """Has the ego touched somebody, or is it about to? Judged at the first such sample."""
     ego = cars[episode.ego]
     if episode.blame == 0 and (ego.crashed or ego.hit):
-        _judge(cars, episode, memory, before, lanes, sight, frames, watch, settings)
+        _judge(cars, episode, past, lanes, sight, frames, watch, settings)
     return episode.blame != 0
 
 
-@njit
-def _judge(cars, episode, memory, before, lanes, sight, frames, watch, settings):
-    _sense(cars, episode, memory, before, lanes, sight, frames, watch, settings)
+@compiled
+def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
+    _sense(cars, episode, past, lanes, sight, frames, watch, settings)
     n = episode.cars - 1
-    ego = watch.users[n]
+    now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
     heaviest, touched = -1, False
     for i in range(n):
         touched |= _touches(cars, _car_of(i, episode), episode.ego, sight, settings.dt)
@@ -236,9 +242,9 @@ def _judge(cars, episode, memory, before, lanes, sight, frames, watch, settings)
         k = _car_of(i, episode)
         if not (_touches(cars, k, episode.ego, sight, settings.dt) if touched else k == nearest):
             continue
-        verdict = judge_contact(
-            ego, watch.users[i], memory[i], settings.ego, settings.other, settings.rules, settings.dt
-        )
+        memory = past.memory[i]
+        catch_up(memory, then[n], then[i], settings.ego, settings.other, settings.rules, settings.dt)
+        verdict = judge_contact(now[n], now[i], memory, settings.ego, settings.other, settings.rules, settings.dt)
         weight = _weight(verdict.verdict)
         if weight > heaviest:
             heaviest = weight

@@ -13,9 +13,9 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.fast.compiled import compiled
 from envs.fast.floats import dot, norm, wrap_to_pi
+from envs.fast.state import CAR_LENGTH
 
 STRAIGHT, SINE, CIRCULAR = range(3)
-CAR_LENGTH = 5.0  # `AbstractLane.VEHICLE_LENGTH` [m]
 
 LANE = np.dtype(
     [

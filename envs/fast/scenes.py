@@ -8,7 +8,7 @@ from envs.fast.draws import integers, normal, random, uniform
 from envs.fast.drivers import speed_to_index
 from envs.fast.motion import set_heading
 from envs.fast.network import closest_lane, heading_at, local_coordinates, position
-from envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
+from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 
 
 @compiled
@@ -52,7 +52,7 @@ def _add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config):
     car.timer = (x + y) * np.pi % config.lane_change_delay
     car.delta = config.delta
     car.impact_x = car.impact_y = 0.0
-    car.length, car.width = 5.0, 2.0
+    car.length, car.width = CAR_LENGTH, CAR_WIDTH
     car.kind = kind
     car.lane = car.target_lane = closest_lane(lanes, x, y, heading)
     car.speed_index, car.route, car.route_step = 0, -1, 0
@@ -120,7 +120,7 @@ def _merge(cars, episode, lanes, config, target_speeds):
     i = _add_vehicle(cars, episode, x, y, 0.0, 20.0, TRAFFIC, lanes, config)
     cars[i].target_speed = 30.0
     i = _add_vehicle(cars, episode, config.obstacle_x, config.obstacle_y, 0.0, 0.0, OBSTACLE, lanes, config)
-    cars[i].length = cars[i].width = 2.0
+    cars[i].length = cars[i].width = OBSTACLE_SIZE
     episode.vehicles -= 1
 
 

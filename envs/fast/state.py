@@ -14,6 +14,9 @@ META = 1  # `MDPVehicle`, driven by meta-actions
 DIRECT = 2  # `Vehicle`, driven by acceleration and steering
 OBSTACLE = 3  # `Obstacle`
 
+CAR_LENGTH, CAR_WIDTH = 5.0, 2.0  # of every vehicle of highway-env [m]
+OBSTACLE_SIZE = 2.0  # [m]
+
 CAR = np.dtype(
     [
         ("x", "f8"),  # centre [m]
@@ -58,6 +61,7 @@ EPISODE = np.dtype(
         ("return_", "f8"),  # rewards since reset
         # the shield on the ego
         ("frame_lane", "i4"),  # lane it measures along, -1 = none yet
+        ("turn", "i4"),  # which of the two last frames is the last
         ("nominal_acceleration", "f8"),  # last command given from outside
         ("nominal_steering", "f8"),
         ("frames", "i4"),  # watched since reset

@@ -1,0 +1,106 @@
+"""Pairs that are far apart are not looked at; the result must not show it."""
+
+import numpy as np
+import pytest
+
+from envs import make
+from shield.command import Command
+from shield.controller import Body, shield_frame
+from shield.pair import ROAD_USER, assess, least_margin, own_share
+from shield.params import PRESETS, Rules
+from shield.response import MEMORY, remember
+
+DT = 0.2
+SIMULATOR = PRESETS["simulator"]
+BODY = Body(2.5, 0.7, 0.0)
+REACH = 40.0  # speeds are drawn up to it [m/s]
+
+
+def anybody(rng):
+    """A road user anywhere near, in any state."""
+    user = np.zeros(1, ROAD_USER)[0]
+    heading = rng.choice([0.0, rng.uniform(-0.2, 0.2), rng.uniform(-np.pi, np.pi)])
+    user["s"], user["y"] = rng.uniform(-250, 250), rng.choice([0.0, 4.0, rng.uniform(-8, 8)])
+    user["heading"], user["cos"], user["sin"] = heading, np.cos(heading), np.sin(heading)
+    user["speed"] = rng.choice([0.0, rng.uniform(-5, REACH)])
+    user["along"], user["u"] = user["speed"] * user["cos"], user["speed"] * user["sin"]
+    user["half_length"], user["half_width"] = rng.uniform(1, 3), rng.uniform(0.5, 3)
+    user["wreck"], user["in_own_lane"] = rng.random() < 0.1, rng.random() < 0.5
+    return user
+
+
+@pytest.mark.parametrize("preset", ["simulator", "slides", "rodionova-conservative"])
+def test_the_quick_bound_is_never_above_the_margin(preset):
+    rng = np.random.default_rng(0)
+    ego_params, other_params = PRESETS[preset][:2]
+    known = 0
+    for rules in (Rules(), Rules(heading_bound=1.0), Rules(discretisation_margin=False)):
+        for _ in range(4000):
+            ego, user = anybody(rng), anybody(rng)
+            ego["wreck"] = False
+            bound = least_margin(ego, user, own_share(ego, ego_params, DT), ego_params, other_params, rules, DT)
+            pair = assess(ego, user, ego_params, other_params, rules, DT)
+            assert bound <= pair.margin_lon + 1e-9
+            assert pair.safe_lon or not bound > 1e-6
+            known += bound > 0.0
+    assert known > 500
+
+
+def test_a_quick_bound_without_the_response_time_would_be_caught():
+    rng = np.random.default_rng(0)
+    hasty = SIMULATOR.ego._replace(response_time=0.0)
+    wrong = 0
+    for _ in range(2000):
+        ego, user = anybody(rng), anybody(rng)
+        bound = least_margin(ego, user, own_share(ego, hasty, DT), hasty, SIMULATOR.other, Rules(), DT)
+        wrong += bound > assess(ego, user, SIMULATOR.ego, SIMULATOR.other, Rules(), DT).margin_lon + 1e-9
+    assert wrong > 10
+
+
+@pytest.mark.parametrize("env_id", ["highway-fast-v0", "two-way-v0", "merge-v1"])
+def test_memory_and_report_are_those_of_a_look_at_everybody(env_id):
+    env = make(env_id, shield="monitor", record=True)
+    skipped = dangerous = 0
+    for seed in range(4):
+        env.reset(seed=seed)
+        rng = np.random.default_rng(seed)
+        ended = False
+        while not ended:
+            *_, terminated, truncated, _ = env.step(int(rng.integers(5)))
+            ended = terminated or truncated
+        quick, full = replay(env.frames, env.settings)
+        for (memory, report), (thorough, nearest, ttc) in zip(quick, full, strict=True):
+            skipped += memory["skipped"].sum()
+            dangerous += (memory["since"] > 0).sum()
+            assert (memory["since"] == thorough["since"]).all()
+            in_danger = memory["since"] > 0
+            for field in MEMORY.names:
+                if field != "age":
+                    assert (memory[field][in_danger] == thorough[field][in_danger]).all(), field
+            assert (report.margin_lon, report.margin_lat, report.ttc) == (*nearest, ttc)
+    assert skipped > 100 and dangerous > 0
+
+
+def replay(frames, settings):
+    """What `shield_frame` remembers and reports over a log, and what a look at every pair gives."""
+    ego_params, other_params, rules, _, dt = settings
+    count = len(frames[0].users)
+    memory, thorough = np.zeros(count, MEMORY), np.zeros(count, MEMORY)
+    last = np.zeros(count + 1, ROAD_USER)
+    quick, full = [], []
+    for frame in frames:
+        report = shield_frame(
+            frame.ego, frame.users, last[-1], last[:-1], memory, Command(0.0, 0.0), BODY, *settings[:3], dt
+        )
+        quick.append((memory.copy(), report))
+        nearest, ttc = (np.inf, np.inf), np.inf
+        for i, user in enumerate(frame.users):
+            pair = assess(frame.ego, user, ego_params, other_params, rules, dt)
+            remember(thorough[i], pair, frame.ego, user, dt)
+            if max(pair.margin_lon, pair.margin_lat) < max(nearest):
+                nearest = pair.margin_lon, pair.margin_lat
+            if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
+                ttc = min(ttc, max(pair.gap_lon, 0.0) / (pair.v_ego - pair.v_other))
+        full.append((thorough.copy(), nearest, ttc))
+        last = np.append(frame.users, np.array([frame.ego], ROAD_USER))
+    return quick, full
