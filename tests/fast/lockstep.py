@@ -129,6 +129,9 @@ def _compare_state(env, engine, where, worst, discrete) -> None:
         if hasattr(user, "target_lane_index"):
             flags["target_lane"] = indices[user.target_lane_index]
             numbers["target_speed"] = user.target_speed
+            flags["yields"] = getattr(user, "is_yielding", False)
+            if user.route is not None:
+                flags["route_step"] = _steps(engine, car) - len(user.route)
         if hasattr(user, "speed_index"):
             flags["speed_index"] = user.speed_index
         if car["kind"] == TRAFFIC:
@@ -140,8 +143,15 @@ def _compare_state(env, engine, where, worst, discrete) -> None:
         for name, value in flags.items():
             if value != car[name]:
                 discrete.append(f"{where}: car {i} {name} {value} {car[name]}")
+    if getattr(road, "steps", 0) != episode["road_frames"]:
+        discrete.append(f"{where}: {road.steps} frames of the road, {episode['road_frames']}")
     if road.np_random.bit_generator.state != generator_state(episode):
         discrete.append(f"{where}: random generator")
+
+
+def _steps(engine, car):
+    """Length of the route that a car planned."""
+    return (engine.scenario.network.route_roads[car["route"]] >= 0).sum()
 
 
 def _compare_observation(seen, out, worst) -> None:
