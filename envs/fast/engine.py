@@ -277,6 +277,7 @@ class Engine:
             np.zeros((num_envs, watched, 2)),
         )
         self.film = Film(np.full(num_envs, -1, np.int32), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
+        self._seen: np.ndarray | None = None  # last observations
         self._size = int(np.prod(scenario.observation_space.shape))
         self._shares = np.linspace(0, num_envs, threads + 1).astype(int)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
@@ -295,7 +296,11 @@ class Engine:
         """Begin new episodes, in all environments or where `mask` `[E]` says so; the others stand still."""
         e = self.num_envs
         todo = np.full(e, RESTART, np.int8) if mask is None else np.where(mask, RESTART, STAY).astype(np.int8)
-        return self._run(Inputs(np.zeros(e, np.int32), np.zeros((e, 2)), todo))
+        seen = self._seen
+        outputs = self._run(Inputs(np.zeros(e, np.int32), np.zeros((e, 2)), todo))
+        if seen is not None:  # traffic may have come and gone since
+            outputs.observations[todo == STAY] = seen[todo == STAY]
+        return outputs
 
     def step(self, actions=None, commands=None) -> Outputs:
         """One decision everywhere.
@@ -336,6 +341,7 @@ class Engine:
                 f"more than {self.scenario.capacity} road users in one environment; "
                 "expected fewer, or a larger `capacity` in `compile_scenario`"
             )
+        self._seen = outputs.observations
         return outputs
 
     def close(self) -> None:

@@ -71,6 +71,7 @@ def _compare(env_id, seeds, policy, config, shield, max_steps, until) -> Compari
     decisions = episodes = 0
     for seed in seeds:
         rng = np.random.default_rng([seed, 99])
+        before = len(discrete)
         seen, _ = stock.reset(seed=seed)
         engine.seed([seed])
         out = engine.reset()
@@ -90,7 +91,7 @@ def _compare(env_id, seeds, policy, config, shield, max_steps, until) -> Compari
                 discrete.append(f"{here}: ends {terminated, truncated}, {out.terminated[0], out.truncated[0]}")
             if shield:
                 _compare_info(info, step_infos(out.steps, engine.scenario, settings), here, discrete)
-            if terminated or truncated or discrete:
+            if terminated or truncated or len(discrete) > before:
                 break
         episodes += 1
         if until and until(decisions):
