@@ -1,15 +1,20 @@
 """Intersections: traffic that comes and goes, and yields."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from highway_env.vehicle.behavior import IDMVehicle
-from lockstep import compare
 
 import envs
 from envs.fast.config import Unsupported, compile_scenario
 from envs.fast.engine import DISABLED, Engine
 
 ENV = "intersection-v0"
+LONG = int(os.environ.get("PARITY_EPISODES", "2"))  # episodes per case
 DENSE = {
     "destination": None,
     "initial_vehicle_count": 16,
@@ -24,25 +29,34 @@ DENSE = {
 }
 
 
-def _agree(comparison):
-    assert comparison.discrete == []
-    assert comparison.state < 1e-8
-    assert comparison.reward < 1e-8
-    assert comparison.observation_ulps <= 1
+CASES = [
+    ("random", DENSE),
+    ("slower", DENSE),
+    ("random", {"initial_vehicle_count": 0}),
+    ("random", {"destination": "o0"}),
+    ("random", {"action": {"type": "ContinuousAction"}}),  # regulation predicts the ego by its steering
+    ("faster", {"action": {"type": "ContinuousAction"}}),
+]
 
 
-@pytest.mark.parametrize("policy", ["random", "slower"])
-def test_overridden_defaults_agree(policy):
-    _agree(compare(ENV, range(2), policy, config=DENSE))
+def test_overridden_defaults_agree_to_the_last_bit():
+    """In a process of its own: numpy's AVX-512 functions are off by one unit in the last place.
 
-
-@pytest.mark.parametrize("config", [{"initial_vehicle_count": 0}, {"destination": "o0"}])
-def test_sparse_roads_and_u_turns_agree(config):
-    _agree(compare(ENV, range(1), config=config))
-
-
-def test_a_directly_driven_ego_is_predicted_by_its_steering():
-    _agree(compare(ENV, range(2), config={"action": {"type": "ContinuousAction"}}))
+    Steering at walking speed magnifies that, in some crowded episodes beyond 1e-8 m.
+    """
+    script = (
+        "from lockstep import compare\n"
+        "from test_intersection import CASES, ENV\n"
+        "for policy, config in CASES:\n"
+        f"    c = compare(ENV, range({LONG}), policy, config=config)\n"
+        "    assert c.discrete == [] and c.state == c.reward == c.observation_ulps == 0, (policy, config, c)"
+    )
+    here = Path(__file__).parent
+    environment = os.environ | {
+        "NPY_DISABLE_CPU_FEATURES": "X86_V4",
+        "PYTHONPATH": f"{here}{os.pathsep}{here.parent.parent}",
+    }
+    subprocess.run([sys.executable, "-W", "ignore", "-c", script], env=environment, check=True)
 
 
 def test_the_same_seeds_give_the_same_episodes():
