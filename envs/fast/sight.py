@@ -14,7 +14,7 @@ from numba import njit
 
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import wrap_to_pi
-from envs.fast.network import CIRCULAR, distance, heading_at, is_on_lane, local_coordinates
+from envs.fast.network import SINE, STRAIGHT, distance, heading_at, is_on_lane, local_coordinates
 from envs.fast.state import CAR
 
 MOMENTS = 11  # at which a regulated road looks ahead
@@ -88,8 +88,8 @@ def update_lanes(cars, n, lanes, sight):
 def place(cars, n, lanes, sight):
     """`project` and `update_lanes` at once, for many short lanes.
 
-    Arc lengths on a circle stay unknown (nan) for a car that is neither on it nor could be nearest to
-    it; `locate` finds them when asked. Fills `sight.on` as well.
+    Arc lengths stay unknown (nan) where a car is neither on a lane nor could be nearest to it; `locate`
+    finds them when asked. Fills `sight.on` as well.
     """
     for i in range(n):
         car = cars[i]
@@ -101,7 +101,7 @@ def place(cars, n, lanes, sight):
         best, nearest, on = np.inf, 0, 0
         for k in range(len(lanes)):
             lane = lanes[k]
-            if lane.kind == CIRCULAR and _is_far_from_circle(lane, x, y, max(bound, lane.width / 2 + 1.0)):
+            if _is_far(lane, x, y, max(bound, lane.width / 2 + 1.0) + 1e-6):
                 sight.s[k, i] = np.nan
                 continue
             s, lateral = local_coordinates(lane, x, y)
@@ -118,13 +118,17 @@ def place(cars, n, lanes, sight):
 
 
 @compiled
-def _is_far_from_circle(lane, x, y, reach):
-    """Is a point surely farther than `reach` from the line of a circle [m]?"""
-    dx, dy = abs(x - lane.x), abs(y - lane.y)
-    outer = lane.radius + reach + 1e-6
-    if dx > outer or dy > outer:
+def _is_far(lane, x, y, reach):
+    """Is a point farther than `reach` from the endless line or full circle of a lane [m]? In doubt no."""
+    dx, dy = x - lane.x, y - lane.y
+    if lane.kind == STRAIGHT:
+        return abs(dx * lane.lx + dy * lane.ly) > reach
+    if lane.kind == SINE:
+        return False
+    outer = lane.radius + reach
+    if abs(dx) > outer or abs(dy) > outer:
         return True
-    inner = max(lane.radius - reach - 1e-6, 0.0)
+    inner = max(lane.radius - reach, 0.0)
     square = dx * dx + dy * dy
     return square > outer * outer or square < inner * inner
 
