@@ -83,6 +83,16 @@ def test_rows_of_cars_that_left_are_empty():
         assert ((lengths > 0).sum(axis=1) == engine.batch.episodes["cars"]).all()
 
 
+def test_a_masked_reset_returns_the_last_observation_of_the_others():
+    engine = Engine(compile_scenario(ENV), 4, autoreset=DISABLED)
+    engine.seed(range(4))
+    engine.reset()
+    before = engine.step(np.full(4, 1, np.int32)).observations
+    after = engine.reset(np.array([True, False, False, False])).observations
+    assert np.array_equal(after[1:], before[1:])
+    assert not np.array_equal(after[0], before[0])
+
+
 def test_too_many_cars_are_an_error():
     engine = Engine(compile_scenario(ENV, capacity=6), 4)
     engine.seed(range(4))
