@@ -153,7 +153,9 @@ _DESTINATIONS: dict[int, tuple[str, ...]] = {
     ROUNDABOUT: ("nxs", "exr", "sxr", "nxr"),
     INTERSECTION: _ARMS,
 }
-MOST_CARS = 64  # room at an intersection, at most; new cars keep 15 m apart, so queues end well before
+# Room at an intersection, at most. Behind an ego that stands still for 150 s, with a new car tried every
+# second, the fullest of 256 environments held 58.
+MOST_CARS = 64
 
 
 def compile_scenario(env_id: str, config: dict | None = None, capacity: int | None = None) -> Scenario:
