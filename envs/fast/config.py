@@ -4,6 +4,7 @@ The stock environment is built once and asked for its configuration, roads and s
 default and every override means what it means there.
 """
 
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import gymnasium as gym
@@ -19,7 +20,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from envs.fast.network import Network, compile_network
 from envs.fast.state import REWARDS
 
-HIGHWAY, MERGE, TWO_WAY, EXIT, ROUNDABOUT = range(5)
+HIGHWAY, MERGE, TWO_WAY, EXIT, ROUNDABOUT, INTERSECTION = range(6)
 KINEMATICS, TIME_TO_COLLISION = range(2)
 PRESENCE, X, Y, VX, VY, HEADING, COS_H, SIN_H = range(8)
 FEATURES = ("presence", "x", "y", "vx", "vy", "heading", "cos_h", "sin_h")
@@ -58,7 +59,11 @@ CONFIG = np.dtype(
         ("main_lane", "i4"),  # first lane of the road where the scene plays
         ("side_lane", "i4"),  # where others come from
         ("other_lane", "i4"),
-        ("destination", "i4"),  # of the incoming car, -1 = drawn
+        ("destination", "i4"),  # of the incoming car, or the ego at an intersection; -1 = drawn
+        ("arm", "i4"),  # lanes from one entry of an intersection to the next
+        ("warm_up_frames", "i4"),  # before the ego appears
+        ("regulation_period", "i4"),  # frames between decisions on who yields, 0 = nobody does
+        ("spawn_probability", "f8"),  # of a new car after each decision
         ("obstacle_x", "f8"),  # [m]
         ("obstacle_y", "f8"),
         ("end_x", "f8"),  # the episode ends beyond it [m]
@@ -139,12 +144,29 @@ SCENARIOS = {
     "exit-v1": EXIT,
     "roundabout-v0": ROUNDABOUT,
     "roundabout-v1": ROUNDABOUT,
+    "intersection-v0": INTERSECTION,
+    "intersection-v2": INTERSECTION,
 }
-_DESTINATIONS: dict[int, tuple[str, ...]] = {EXIT: ("3",), ROUNDABOUT: ("nxs", "exr", "sxr", "nxr")}
+_ARMS = ("o0", "o1", "o2", "o3")
+_DESTINATIONS: dict[int, tuple[str, ...]] = {
+    EXIT: ("3",),
+    ROUNDABOUT: ("nxs", "exr", "sxr", "nxr"),
+    INTERSECTION: _ARMS,
+}
+# Room at an intersection, at most. Behind an ego that stands still for 150 s, with a new car tried every
+# second, the fullest of 256 environments held 58.
+MOST_CARS = 64
 
 
-def compile_scenario(env_id: str, config: dict | None = None) -> Scenario:
+def compile_scenario(env_id: str, config: dict | None = None, capacity: int | None = None) -> Scenario:
     """Everything the engine needs to run an environment.
+
+    Args:
+      env_id: "highway-v0", ...
+      config: as for `gymnasium.make`.
+      capacity: road users that there is room for where traffic comes and goes. None = as many as can
+        appear in an episode, at most `MOST_CARS`. The engine raises `OverflowError` when a car finds
+        no room.
 
     Raises:
       ValueError: the environment or something in its configuration is not supported; the message
@@ -152,7 +174,8 @@ def compile_scenario(env_id: str, config: dict | None = None) -> Scenario:
     """
     if env_id not in SCENARIOS:
         raise Unsupported(f"env_id = {env_id!r}", f"one of {', '.join(SCENARIOS)}")
-    wrapped = gym.make(env_id, config=config)
+    with _drivers_unchanged():
+        wrapped = gym.make(env_id, config=config)
     env = wrapped.unwrapped
     given = env.config
     _check(given)
@@ -173,8 +196,16 @@ def compile_scenario(env_id: str, config: dict | None = None) -> Scenario:
     number = {index: i for i, index in enumerate(env.road.network.lanes_dict())}
     reward_names = _FILL_SCENE[scenario](record, given, env, number)
     network = compile_network(
-        env.road.network, given["neighbour_vehicles_connected_lanes"], _DESTINATIONS.get(scenario, ())
+        env.road.network,
+        given["neighbour_vehicles_connected_lanes"],
+        _DESTINATIONS.get(scenario, ()),
+        lined_up=scenario != INTERSECTION,
     )
+    if scenario != INTERSECTION:
+        capacity = len(env.road.vehicles) + len(env.road.objects)
+    elif capacity is None:
+        decisions = record["duration"][0] / record["period"][0] + 2
+        capacity = int(min(MOST_CARS, max(given["initial_vehicle_count"], 1) + 1 + np.ceil(decisions)))
     return Scenario(
         env_id,
         record,
@@ -186,11 +217,23 @@ def compile_scenario(env_id: str, config: dict | None = None) -> Scenario:
         connected,
         _lane_odds(given) if scenario == EXIT else np.ones(1),
         reward_names,
-        len(env.road.vehicles) + len(env.road.objects),
+        capacity,
         env.observation_space,
         env.action_space,
         env,
     )
+
+
+@contextmanager
+def _drivers_unchanged():
+    """Undo what an `IntersectionEnv` does to the class of all traffic in the process."""
+    names = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
+    saved = {name: getattr(IDMVehicle, name) for name in names}
+    try:
+        yield
+    finally:
+        for name, value in saved.items():
+            setattr(IDMVehicle, name, value)
 
 
 def _check(given: dict) -> None:
@@ -354,10 +397,32 @@ def _fill_roundabout(record, given: dict, env, number: dict) -> tuple[str, ...]:
     )
 
 
+def _fill_intersection(record, given: dict, env, number: dict) -> tuple[str, ...]:
+    # what `IntersectionEnv` writes into the class of its traffic
+    record["distance_wanted"], record["comfort_acc_max"], record["comfort_acc_min"] = 7.0, 6.0, -3.0
+    entries = [number[f"o{k}", f"ir{k}", 0] for k in range(4)]
+    record["main_lane"], record["arm"] = entries[0], entries[1] - entries[0]
+    assert entries == list(range(entries[0], entries[3] + 1, entries[1] - entries[0]))
+    asked = given["destination"]
+    if asked and asked not in _ARMS:
+        raise Unsupported(f"destination = {asked!r}", f"None or one of {', '.join(_ARMS)}")
+    record["destination"] = _ARMS.index(asked) if asked else -1
+    record["traffic"] = given["initial_vehicle_count"]
+    record["spawn_probability"] = given["spawn_probability"]
+    record["warm_up_frames"] = 3 * given["simulation_frequency"]
+    record["regulation_period"] = int(1 / record["dt"][0] / env.road.REGULATION_FREQUENCY)
+    record["offroad_terminal"] = given["offroad_terminal"]
+    record["normalize_reward"] = given["normalize_reward"]
+    record["reward_low"], record["reward_high"] = given["collision_reward"], given["arrived_reward"]
+    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    return _set_weights(record, given, ("collision_reward", "high_speed_reward", "arrived_reward", "on_road_reward"))
+
+
 _FILL_SCENE = {
     HIGHWAY: _fill_highway,
     MERGE: _fill_merge,
     TWO_WAY: _fill_two_way,
     EXIT: _fill_exit,
     ROUNDABOUT: _fill_roundabout,
+    INTERSECTION: _fill_intersection,
 }

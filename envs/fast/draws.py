@@ -115,6 +115,17 @@ def integers(rng, n):
 
 
 @compiled
+def two_of(rng, n):
+    """`Generator.choice(n, 2, replace=False)` of up to 10 000 things: Floyd's algorithm, then a shuffle."""
+    first, second = integers(rng, n - 1), integers(rng, n)
+    if second == first:
+        second = n - 1
+    if integers(rng, 2) == 0:
+        first, second = second, first
+    return first, second
+
+
+@compiled
 def normal(rng):
     """`Generator.normal()`: standard normal, by the ziggurat."""
     while True:

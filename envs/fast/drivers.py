@@ -9,7 +9,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import clip, dot, not_zero, wrap_to_pi
 from envs.fast.network import distance, heading_at, is_after_end, is_reachable, local_coordinates, position
-from envs.fast.sight import car_ahead, car_behind
+from envs.fast.sight import car_ahead, car_behind, locate
 from envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)  # as in `DiscreteMetaAction.ACTIONS_ALL`
@@ -112,8 +112,11 @@ def follow_road(cars, i, net, lanes, sight):
     """At the end of the target lane, head for the next one."""
     car = cars[i]
     k = car.target_lane
+    locate(k, i, cars, lanes, sight)
     if is_after_end(lanes[k], sight.s[k, i]):
-        car.target_lane = _next_lane(car, sight.s[k, i], net, lanes)
+        k = _next_lane(car, sight.s[k, i], net, lanes)
+        car.target_lane = k
+        locate(k, i, cars, lanes, sight)
 
 
 @compiled
@@ -207,7 +210,10 @@ def idm_acceleration(cars, i, ahead, delta, lanes, s, idm):
     target = clip(target, 0.0, lanes[car.lane].speed_limit)
     a = idm.comfort_acc_max * (1 - (max(car.speed, 0.0) / abs(not_zero(target))) ** delta)
     if ahead >= 0:
-        gap = s[car.lane, ahead] - s[car.lane, i]
+        there = s[car.lane, ahead]
+        if np.isnan(there):
+            there, _ = local_coordinates(lanes[car.lane], cars[ahead].x, cars[ahead].y)
+        gap = there - s[car.lane, i]
         ratio = desired_gap(cars, i, ahead, idm) / not_zero(gap)
         a -= idm.comfort_acc_max * (ratio * ratio)
     return a

@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.collisions import collide
 from envs.fast.compiled import compiled, kernel
-from envs.fast.config import Scenario
+from envs.fast.config import INTERSECTION, Scenario
 from envs.fast.draws import load_generator
-from envs.fast.drivers import decide, take_meta_action
+from envs.fast.drivers import take_meta_action
+from envs.fast.frame import act, survey, think
 from envs.fast.guard import (
     MONITOR,
     OFF,
@@ -31,13 +31,13 @@ from envs.fast.guard import (
     start_watch,
     watch_frame,
 )
-from envs.fast.motion import move
 from envs.fast.network import Network
 from envs.fast.observations import observe
 from envs.fast.rewards import is_terminated, is_truncated, rate
 from envs.fast.scenes import make_scene
-from envs.fast.sight import line_up, make_sight, project, sort_along_x, update_lanes
+from envs.fast.sight import make_sight, sort_along_x
 from envs.fast.state import CAR, EPISODE, STEP
+from envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from envs.highway import Settings
 from shield.params import PRESETS, Rules
 from shield.pair import ROAD_USER
@@ -106,9 +106,12 @@ class Film(NamedTuple):
 def _restart(cars, episode, order, past, world, sight, watch, mode, step, out):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
-    make_scene(cars, episode, order, world.network, lanes, config, world.target_speeds, world.lane_odds)
+    if config.scenario == INTERSECTION:
+        open_intersection(cars, episode, order, world.network, sight, config, world.target_speeds)
+    else:
+        make_scene(cars, episode, order, world.network, lanes, config, world.target_speeds, world.lane_odds)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
-    project(cars, episode.cars, lanes, sight)
+    survey(cars, episode, lanes, sight, config)
     sort_along_x(cars, episode.cars, order)
     start_watch(episode, past, watch)
     start_tally(step)
@@ -159,7 +162,7 @@ def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode,
     config, net = world.config[0], world.network
     lanes = net.lanes
     ego = cars[episode.ego]
-    project(cars, episode.cars, lanes, sight)
+    survey(cars, episode, lanes, sight, config)
     start_tally(step)
     had_contact = episode.blame != 0
     for frame in range(config.frames):
@@ -170,15 +173,10 @@ def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode,
             else:
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
-        line_up(episode.cars, lanes, order, sight)
-        decide(cars, episode, net, lanes, sight, config)
+        think(cars, episode, order, net, sight, config)
         if mode != OFF:
             watch_frame(cars, episode, past, lanes, sight, world.frames, watch, settings, step)
-        move(cars, episode.vehicles, config.dt, config.max_speed, config.min_speed)
-        project(cars, episode.cars, lanes, sight)
-        update_lanes(cars, episode.vehicles, lanes, sight)
-        sort_along_x(cars, episode.cars, order)
-        collide(cars, episode, order, sight, config.dt)
+        act(cars, episode, order, net, sight, config)
         if film.slots[e] >= 0:
             for i in range(len(cars)):
                 film.cars[film.slots[e], frame, i] = cars[i]
@@ -205,7 +203,7 @@ def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalt
         outputs.rewards[e] = 0.0
         outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
-            project(cars, episode.cars, lanes, sight)
+            survey(cars, episode, lanes, sight, config)
             _see(cars, episode, world, sight, observation)
             _report(cars, episode, mode, 0.0, step)
             continue
@@ -225,6 +223,8 @@ def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalt
         outputs.truncated[e] = is_truncated(episode, config)
         episode.ended = outputs.terminated[e] or outputs.truncated[e]
         _report(cars, episode, mode, cost, step)
+        if config.scenario == INTERSECTION:
+            let_traffic_flow(cars, episode, order, world.network, config)
         if episode.ended and autoreset == SAME_STEP:
             outputs.final_observations[e, :] = observation
             outputs.final_steps[e] = step
@@ -280,6 +280,7 @@ class Engine:
             np.zeros((num_envs, 2, watched), ROAD_USER),
         )
         self.film = Film(np.full(num_envs, -1, np.int32), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
+        self._seen: np.ndarray | None = None  # last observations
         self._size = int(np.prod(scenario.observation_space.shape))
         self._shares = np.linspace(0, num_envs, threads + 1).astype(int)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
@@ -298,7 +299,11 @@ class Engine:
         """Begin new episodes, in all environments or where `mask` `[E]` says so; the others stand still."""
         e = self.num_envs
         todo = np.full(e, RESTART, np.int8) if mask is None else np.where(mask, RESTART, STAY).astype(np.int8)
-        return self._run(Inputs(np.zeros(e, np.int32), np.zeros((e, 2)), todo))
+        seen = self._seen
+        outputs = self._run(Inputs(np.zeros(e, np.int32), np.zeros((e, 2)), todo))
+        if seen is not None:  # traffic may have come and gone since
+            outputs.observations[todo == STAY] = seen[todo == STAY]
+        return outputs
 
     def step(self, actions=None, commands=None) -> Outputs:
         """One decision everywhere.
@@ -333,6 +338,13 @@ class Engine:
             ranges = zip(self._shares[:-1], self._shares[1:], strict=True)
             for done in [self._pool.submit(run, first, last, *common) for first, last in ranges]:
                 done.result()
+        if self.batch.episodes["overflow"].any():
+            self.batch.episodes["overflow"] = False
+            raise OverflowError(
+                f"more than {self.scenario.capacity} road users in one environment; "
+                "expected fewer, or a larger `capacity` in `compile_scenario`"
+            )
+        self._seen = outputs.observations
         return outputs
 
     def close(self) -> None:

@@ -25,6 +25,7 @@ LANE = np.dtype(
         ("siblings", "i4"),  # lanes of that road, itself included
         ("priority", "i4"),
         ("forbidden", "?"),  # nobody changes to it
+        ("exits", "?"),  # leads out of an intersection
         ("x", "f8"),  # start, or centre of the circle [m]
         ("y", "f8"),
         ("dx", "f8"),  # unit vector along it
@@ -64,18 +65,21 @@ class Network(NamedTuple):
     next_roads: np.ndarray  # `[R, *]` roads that start where this one ends
     links: np.ndarray  # `[L, *]` lanes searched for neighbours of a car on this lane, itself first
     link_offsets: np.ndarray  # `[L, *]` what their arc lengths count from on this lane [m]
+    link_bits: np.ndarray  # `[L]` the same lanes as a set of bits, -1 = any lane
     route_roads: np.ndarray  # `[P, *]` roads of each planned route
     route_lanes: np.ndarray  # `[P, *]` lane id on each, -1 = any
     plans: np.ndarray  # `[L, D]` route from a lane to each of the destinations
 
 
-def compile_network(network, connected: bool, destinations: tuple[str, ...] = ()) -> Network:
+def compile_network(network, connected: bool, destinations: tuple[str, ...] = (), lined_up: bool = True) -> Network:
     """Arrays of a `highway_env.road.road.RoadNetwork`.
 
     Args:
       network: the road network.
       connected: neighbours are searched on connected lanes too.
       destinations: nodes that cars plan their routes to.
+      lined_up: cars are sorted along each lane; else neighbours are searched among all of them, as
+        on connected lanes.
 
     Raises:
       ValueError: a kind of lane that is not supported.
@@ -109,8 +113,9 @@ def compile_network(network, connected: bool, destinations: tuple[str, ...] = ()
         lanes,
         roads,
         _padded(next_roads, np.int32, -1),
-        _padded(links, np.int32, -1),
-        _padded(offsets, np.float64, 0.0),
+        _padded(links, np.int32, -1, 1 if lined_up else 2),
+        _padded(offsets, np.float64, 0.0, 1 if lined_up else 2),
+        np.array([sum(1 << link for link in set(row)) if len(indices) < 63 else -1 for row in links], np.int64),
         _padded(route_roads, np.int32, -1),
         _padded(route_lanes, np.int32, -1),
         plans,
@@ -121,6 +126,7 @@ def _lane(lane, road: int, index) -> np.ndarray:
     row = np.zeros(1, LANE)
     row["road"], row["id"] = road, index[2]
     row["forbidden"], row["priority"] = lane.forbidden, lane.priority
+    row["exits"] = "il" in index[0] and "o" in index[1]
     row["length"], row["width"] = lane.length, lane.width_at(0.0)
     row["speed_limit"] = np.inf if lane.speed_limit is None else lane.speed_limit
     if isinstance(lane, StraightLane):
@@ -162,8 +168,8 @@ def _plan(network, index, destination: str):
     return ControlledVehicle.plan_route_to(car, destination).route
 
 
-def _padded(rows, dtype, filler) -> np.ndarray:
-    table = np.full((len(rows), max([1, *map(len, rows)])), filler, dtype)
+def _padded(rows, dtype, filler, width: int = 1) -> np.ndarray:
+    table = np.full((len(rows), max([width, *map(len, rows)])), filler, dtype)
     for i, row in enumerate(rows):
         table[i, : len(row)] = row
     return table

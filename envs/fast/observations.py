@@ -5,6 +5,7 @@ import numpy as np
 from envs.fast.compiled import compiled
 from envs.fast.config import COS_H, HEADING, PRESENCE, TIME_TO_COLLISION, VX, VY, X, Y
 from envs.fast.floats import clip, dot, lmap, norm, not_zero
+from envs.fast.sight import locate
 from envs.fast.state import OBSTACLE
 
 _PERCEPTION = 200.0  # `AbstractEnv.PERCEPTION_DISTANCE` [m]
@@ -28,14 +29,14 @@ def observe(cars, episode, lanes, sight, config, features, ranges, connected, ta
     if config.observation == TIME_TO_COLLISION:
         _observe_times(cars, episode, lanes, sight, config, connected, target_speeds, out)
     else:
-        _observe_kinematics(cars, episode, sight, config, features, ranges, out)
+        _observe_kinematics(cars, episode, lanes, sight, config, features, ranges, out)
 
 
 @compiled
-def _observe_kinematics(cars, episode, sight, config, features, ranges, out):
+def _observe_kinematics(cars, episode, lanes, sight, config, features, ranges, out):
     """The ego and the cars nearest to it along its lane (`KinematicObservation`, `ExitObservation`)."""
     ego = cars[episode.ego]
-    count = _find_nearest(cars, episode, sight, config)
+    count = _find_nearest(cars, episode, lanes, sight, config)
     n_features = len(features)
     for row in range(config.rows):
         for k in range(n_features):
@@ -59,7 +60,7 @@ def _observe_kinematics(cars, episode, sight, config, features, ranges, out):
 
 
 @compiled
-def _find_nearest(cars, episode, sight, config):
+def _find_nearest(cars, episode, lanes, sight, config):
     """Fill `sight.nearest` with the observed road users, nearest along the lane first; returns how many."""
     ego = cars[episode.ego]
     s = sight.s[ego.lane]
@@ -69,6 +70,7 @@ def _find_nearest(cars, episode, sight, config):
         obstacle = cars[j].kind == OBSTACLE
         if j == episode.ego or (obstacle and not config.obstacles):
             continue
+        locate(ego.lane, j, cars, lanes, sight)
         ahead = s[j] - here
         if not ahead > _BEHIND and (obstacle or not config.see_behind):
             continue

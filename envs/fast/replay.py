@@ -1,6 +1,7 @@
 """Engine states in real highway-env environments and back: for rendering, and for checking."""
 
 import numpy as np
+from highway_env.road.regulation import RegulatedRoad
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
@@ -38,6 +39,8 @@ def show(env, cars: np.ndarray, network: Network, episode: np.ndarray | None = N
         env.time = float(episode["time"])
         env.steps = int(episode["steps"]) * int(env.config["simulation_frequency"] // env.config["policy_frequency"])
         road.np_random.bit_generator.state = generator_state(episode)
+        if isinstance(road, RegulatedRoad):
+            road.steps = int(episode["road_frames"])
 
 
 def _vehicle(env, car, indices, network: Network):
@@ -47,6 +50,8 @@ def _vehicle(env, car, indices, network: Network):
         vehicle = IDMVehicle(*pose)
         vehicle.timer, vehicle.DELTA = float(car["timer"]), float(car["delta"])
         vehicle.enable_lane_change = bool(car["changes_lane"])
+        if car["yields"]:
+            vehicle.is_yielding, vehicle.yield_timer, vehicle.color = True, 0, RegulatedRoad.YIELDING_COLOR
     elif car["kind"] == META:
         vehicle = env.action_type.vehicle_class(*pose)
         vehicle.speed_index = int(car["speed_index"])

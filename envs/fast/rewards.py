@@ -1,10 +1,12 @@
 """Rewards and the ends of episodes."""
 
 from envs.fast.compiled import compiled
-from envs.fast.config import EXIT, HIGHWAY, MERGE, TWO_WAY
+from envs.fast.config import EXIT, HIGHWAY, INTERSECTION, MERGE, TWO_WAY
 from envs.fast.floats import clip, lmap
 from envs.fast.network import is_on_lane
 from envs.fast.state import DIRECT
+
+_EXIT_DISTANCE = 25.0  # beyond an intersection [m]
 
 
 @compiled
@@ -12,6 +14,13 @@ def is_on_road(cars, i, lanes, sight):
     """Is a car on the lane that is nearest to it?"""
     k = cars[i].lane
     return is_on_lane(lanes[k], sight.s[k, i], sight.lateral[k, i], 0.0)
+
+
+@compiled
+def has_arrived(cars, i, lanes, sight):
+    """Has a car left the intersection?"""
+    k = cars[i].lane
+    return lanes[k].exits and sight.s[k, i] >= _EXIT_DISTANCE
 
 
 @compiled
@@ -57,6 +66,13 @@ def rate(cars, episode, action, lanes, sight, config, step):
         step.reward_3 = lanes[lane].id
         reward = _normalized(_weigh(step, config), config)
         return clip(reward, 0.0, 1.0) if config.normalize_reward else reward
+    if config.scenario == INTERSECTION:
+        arrived = has_arrived(cars, episode.ego, lanes, sight)
+        step.reward_1 = clip(_scaled(ego.speed, config), 0.0, 1.0)
+        step.reward_2 = 1.0 if arrived else 0.0
+        step.reward_3 = on_road
+        reward = config.weight_2 if arrived else _weigh(step, config)
+        return _normalized(reward * on_road, config)
     # ROUNDABOUT
     step.reward_1 = ego.speed_index / 2
     step.reward_2 = changes_lane
@@ -102,7 +118,8 @@ def is_terminated(cars, episode, lanes, sight, config):
     """Is the state terminal?"""
     ego = cars[episode.ego]
     off_road = config.offroad_terminal and not is_on_road(cars, episode.ego, lanes, sight)
-    return ego.crashed or ego.x > config.end_x or off_road
+    arrived = config.scenario == INTERSECTION and has_arrived(cars, episode.ego, lanes, sight)
+    return ego.crashed or ego.x > config.end_x or off_road or arrived
 
 
 @compiled

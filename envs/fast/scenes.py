@@ -41,7 +41,7 @@ def make_scene(cars, episode, order, net, lanes, config, target_speeds, lane_odd
 
 
 @compiled
-def _add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config):
+def add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config):
     """Put a new vehicle on the road; returns its index."""
     i = episode.cars
     car = cars[i]
@@ -58,16 +58,17 @@ def _add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config):
     car.speed_index, car.route, car.route_step = 0, -1, 0
     car.crashed = car.hit = False
     car.checks = car.changes_lane = True
+    car.yields = False
     episode.cars += 1
     episode.vehicles += 1
     return i
 
 
 @compiled
-def _add_ego(cars, episode, x, y, heading, speed, lanes, config, target_speeds):
+def add_ego(cars, episode, x, y, heading, speed, lanes, config, target_speeds):
     """Put the controlled vehicle on the road; returns its index."""
     kind = META if config.meta_actions else DIRECT
-    i = _add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config)
+    i = add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config)
     if config.meta_actions:
         cars[i].speed_index = speed_to_index(speed, target_speeds)
         cars[i].target_speed = target_speeds[cars[i].speed_index]
@@ -90,36 +91,36 @@ def _highway(cars, episode, lanes, config, target_speeds):
     lane = lanes[config.ego_lane if config.ego_lane >= 0 else integers(episode, len(lanes))]
     s = _ahead_of_all(cars, episode, lane, 25.0, config.ego_spacing, config)
     x, y = position(lane, s, 0.0)
-    _add_ego(cars, episode, x, y, heading_at(lane, s), 25.0, lanes, config, target_speeds)
+    add_ego(cars, episode, x, y, heading_at(lane, s), 25.0, lanes, config, target_speeds)
     for _ in range(config.traffic):
         lane = lanes[integers(episode, len(lanes))]
         speed = uniform(episode, 0.7 * lane.speed_limit, 0.8 * lane.speed_limit)
         s = _ahead_of_all(cars, episode, lane, speed, config.traffic_spacing, config)
-        i = _add_on_lane(cars, episode, lane, s, speed, lanes, config)
+        i = add_on_lane(cars, episode, lane, s, speed, lanes, config)
         cars[i].delta = uniform(episode, config.delta_low, config.delta_high)
         cars[i].checks = config.traffic_checks
 
 
 @compiled
-def _add_on_lane(cars, episode, lane, s, speed, lanes, config):
+def add_on_lane(cars, episode, lane, s, speed, lanes, config):
     """Put a car of the traffic on a lane, along it; returns its index."""
     x, y = position(lane, s, 0.0)
-    return _add_vehicle(cars, episode, x, y, heading_at(lane, s), speed, TRAFFIC, lanes, config)
+    return add_vehicle(cars, episode, x, y, heading_at(lane, s), speed, TRAFFIC, lanes, config)
 
 
 @compiled
 def _merge(cars, episode, lanes, config, target_speeds):
     x, y = position(lanes[config.main_lane + 1], 30.0, 0.0)
-    _add_ego(cars, episode, x, y, 0.0, 30.0, lanes, config, target_speeds)
+    add_ego(cars, episode, x, y, 0.0, 30.0, lanes, config, target_speeds)
     for s, speed in ((90.0, 29.0), (70.0, 31.0), (5.0, 31.5)):
         lane = lanes[config.main_lane + integers(episode, 2)]
         x, y = position(lane, s + uniform(episode, -5.0, 5.0), 0.0)
         speed += uniform(episode, -1.0, 1.0)
-        _add_vehicle(cars, episode, x, y, 0.0, speed, TRAFFIC, lanes, config)
+        add_vehicle(cars, episode, x, y, 0.0, speed, TRAFFIC, lanes, config)
     x, y = position(lanes[config.side_lane], 110.0, 0.0)
-    i = _add_vehicle(cars, episode, x, y, 0.0, 20.0, TRAFFIC, lanes, config)
+    i = add_vehicle(cars, episode, x, y, 0.0, 20.0, TRAFFIC, lanes, config)
     cars[i].target_speed = 30.0
-    i = _add_vehicle(cars, episode, config.obstacle_x, config.obstacle_y, 0.0, 0.0, OBSTACLE, lanes, config)
+    i = add_vehicle(cars, episode, config.obstacle_x, config.obstacle_y, 0.0, 0.0, OBSTACLE, lanes, config)
     cars[i].length = cars[i].width = OBSTACLE_SIZE
     episode.vehicles -= 1
 
@@ -128,14 +129,14 @@ def _merge(cars, episode, lanes, config, target_speeds):
 def _two_way(cars, episode, lanes, config, target_speeds):
     lane = lanes[config.main_lane + 1]
     x, y = position(lane, 30.0, 0.0)
-    _add_ego(cars, episode, x, y, 0.0, 30.0, lanes, config, target_speeds)
+    add_ego(cars, episode, x, y, 0.0, 30.0, lanes, config, target_speeds)
     for k in range(3):
         s = 70.0 + 40.0 * k + 10.0 * normal(episode)
-        i = _add_on_lane(cars, episode, lane, s, 24.0 + 2.0 * normal(episode), lanes, config)
+        i = add_on_lane(cars, episode, lane, s, 24.0 + 2.0 * normal(episode), lanes, config)
         cars[i].changes_lane = False
     for k in range(2):
         s = 200.0 + 100.0 * k + 10.0 * normal(episode)
-        i = _add_on_lane(cars, episode, lanes[config.side_lane], s, 20.0 + 5.0 * normal(episode), lanes, config)
+        i = add_on_lane(cars, episode, lanes[config.side_lane], s, 20.0 + 5.0 * normal(episode), lanes, config)
         cars[i].changes_lane = False
         cars[i].target_lane = config.side_lane
 
@@ -145,11 +146,11 @@ def _exit(cars, episode, net, lanes, config, target_speeds, lane_odds):
     lane = lanes[config.main_lane]
     s = _ahead_of_all(cars, episode, lane, 25.0, config.ego_spacing, config)
     x, y = position(lane, s, 0.0)
-    _add_ego(cars, episode, x, y, heading_at(lane, s), 25.0, lanes, config, target_speeds)
+    add_ego(cars, episode, x, y, heading_at(lane, s), 25.0, lanes, config, target_speeds)
     for _ in range(config.traffic):
         lane = lanes[config.main_lane + _choose(episode, lane_odds)]
         s = _ahead_of_all(cars, episode, lane, lane.speed_limit, config.traffic_spacing, config)
-        i = _add_on_lane(cars, episode, lane, s, lane.speed_limit, lanes, config)
+        i = add_on_lane(cars, episode, lane, s, lane.speed_limit, lanes, config)
         cars[i].route = net.plans[cars[i].lane, 0]
         cars[i].changes_lane = False
 
@@ -168,7 +169,7 @@ def _choose(episode, odds):
 def _roundabout(cars, episode, net, lanes, config, target_speeds):
     lane = lanes[config.main_lane]
     x, y = position(lane, 125.0, 0.0)
-    i = _add_ego(cars, episode, x, y, heading_at(lane, 140.0), 8.0, lanes, config, target_speeds)
+    i = add_ego(cars, episode, x, y, heading_at(lane, 140.0), 8.0, lanes, config, target_speeds)
     cars[i].route = net.plans[cars[i].lane, 0]
     circle = config.side_lane
     _add_incoming(cars, episode, net, lanes, config, circle + 1, 5.0, config.destination)
@@ -181,7 +182,7 @@ def _roundabout(cars, episode, net, lanes, config, target_speeds):
 def _add_incoming(cars, episode, net, lanes, config, k, s, destination):
     """Put a car on lane `k` near arc length `s`, bound for a destination, -1 = drawn."""
     s += normal(episode) * 2.0
-    i = _add_on_lane(cars, episode, lanes[k], s, 16.0 + normal(episode) * 2.0, lanes, config)
+    i = add_on_lane(cars, episode, lanes[k], s, 16.0 + normal(episode) * 2.0, lanes, config)
     if destination < 0:
         destination = integers(episode, 3)
     cars[i].route = net.plans[cars[i].lane, 1 + destination]

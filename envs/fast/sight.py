@@ -2,6 +2,9 @@
 
 Positions do not change while cars decide, so each car is projected on each lane once per frame.
 Every lane keeps the cars on it sorted by arc length; neighbours are then next to each other.
+
+Intersections have many short lanes, most of them circles that few cars are near. There `place` leaves
+out what nobody will ask for, and neighbours are searched among all cars.
 """
 
 from typing import NamedTuple
@@ -11,7 +14,10 @@ from numba import njit
 
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import wrap_to_pi
-from envs.fast.network import distance, heading_at, is_on_lane, local_coordinates
+from envs.fast.network import SINE, STRAIGHT, distance, heading_at, is_on_lane, local_coordinates
+from envs.fast.state import CAR
+
+MOMENTS = 11  # at which a regulated road looks ahead
 
 
 class Sight(NamedTuple):
@@ -27,6 +33,9 @@ class Sight(NamedTuple):
     corners: np.ndarray  # `[2, 4, 2]` of two boxes [m]
     nearest: np.ndarray  # `[N]` observed cars
     grid: np.ndarray  # `[speeds, lanes, times]` time-to-collision grid
+    on: np.ndarray  # `[N]` lanes each car may be on, as a set of bits
+    futures: np.ndarray  # `[N, MOMENTS + 2, 3]` predicted x, y, heading; then the smallest and the largest
+    ghost: np.ndarray  # `[1]` CAR, a copy to predict with
 
 
 @njit
@@ -43,6 +52,9 @@ def make_sight(n_lanes, n, speeds, lanes, times):
         np.empty((2, 4, 2)),
         np.empty(n, np.int32),
         np.empty((speeds, lanes, times)),
+        np.full(n, -1, np.int64),
+        np.empty((n, MOMENTS + 2, 3)),
+        np.empty(1, CAR),
     )
 
 
@@ -70,6 +82,62 @@ def update_lanes(cars, n, lanes, sight):
                 if far < best:
                     best, nearest = far, k
         cars[i].lane = nearest
+
+
+@compiled
+def place(cars, n, lanes, sight):
+    """`project` and `update_lanes` at once, for many short lanes.
+
+    Arc lengths stay unknown (nan) where a car is neither on a lane nor could be nearest to it; `locate`
+    finds them when asked. Fills `sight.on` as well.
+    """
+    for i in range(n):
+        car = cars[i]
+        x, y = car.x, car.y
+        lane = lanes[car.lane]
+        s, lateral = local_coordinates(lane, x, y)
+        # no lane farther away than the one of before can be the nearest
+        bound = distance(lane, s, lateral) + abs(wrap_to_pi(car.heading - heading_at(lane, s)))
+        best, nearest, on = np.inf, 0, 0
+        for k in range(len(lanes)):
+            lane = lanes[k]
+            if _is_far(lane, x, y, max(bound, lane.width / 2 + 1.0) + 1e-6):
+                sight.s[k, i] = np.nan
+                continue
+            s, lateral = local_coordinates(lane, x, y)
+            sight.s[k, i], sight.lateral[k, i] = s, lateral
+            if is_on_lane(lane, s, lateral, 1.0):
+                on |= 1 << k
+            far = distance(lane, s, lateral)
+            if far <= bound and far < best:
+                far += abs(wrap_to_pi(car.heading - heading_at(lane, s)))
+                if far < best:
+                    best, nearest = far, k
+        car.lane = nearest
+        sight.on[i] = on
+
+
+@compiled
+def _is_far(lane, x, y, reach):
+    """Is a point farther than `reach` from the endless line or full circle of a lane [m]? In doubt no."""
+    dx, dy = x - lane.x, y - lane.y
+    if lane.kind == STRAIGHT:
+        return abs(dx * lane.lx + dy * lane.ly) > reach
+    if lane.kind == SINE:
+        return False
+    outer = lane.radius + reach
+    if abs(dx) > outer or abs(dy) > outer:
+        return True
+    inner = max(lane.radius - reach, 0.0)
+    square = dx * dx + dy * dy
+    return square > outer * outer or square < inner * inner
+
+
+@merged
+def locate(k, i, cars, lanes, sight):
+    """Make sure that the lane coordinates of car `i` on lane `k` are known."""
+    if np.isnan(sight.s[k, i]):
+        sight.s[k, i], sight.lateral[k, i] = local_coordinates(lanes[k], cars[i].x, cars[i].y)
 
 
 @compiled
@@ -173,8 +241,9 @@ def _along(k, j, net, lanes, sight):
 @compiled
 def _car_ahead_connected(k, i, n, net, lanes, sight):
     nearest, ahead = np.inf, -1
+    bits = net.link_bits[k]
     for j in range(n):
-        if j != i:
+        if j != i and sight.on[j] & bits != 0:
             s, found = _along(k, j, net, lanes, sight)
             if found and s >= sight.s[k, i] and s <= nearest:
                 nearest, ahead = s, j
@@ -184,8 +253,9 @@ def _car_ahead_connected(k, i, n, net, lanes, sight):
 @compiled
 def _car_behind_connected(k, i, n, net, lanes, sight):
     nearest, behind = -np.inf, -1
+    bits = net.link_bits[k]
     for j in range(n):
-        if j != i:
+        if j != i and sight.on[j] & bits != 0:
             s, found = _along(k, j, net, lanes, sight)
             if found and s < sight.s[k, i] and s > nearest:
                 nearest, behind = s, j

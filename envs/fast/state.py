@@ -44,6 +44,7 @@ CAR = np.dtype(
         ("hit", "?"),  # an impact is due
         ("checks", "?"),  # looks for collisions itself
         ("changes_lane", "?"),
+        ("yields", "?"),  # told to give way at an intersection
     ],
     align=True,
 )
@@ -59,6 +60,8 @@ EPISODE = np.dtype(
         ("ended", "?"),  # the last step ended the episode
         ("observed_lanes", "i4"),  # lanes of the road at reset, which scale the observed y
         ("return_", "f8"),  # rewards since reset
+        ("road_frames", "i4"),  # since the road was made, on roads that are regulated
+        ("overflow", "?"),  # a car found no room in the arrays
         # the shield on the ego
         ("frame_lane", "i4"),  # lane it measures along, -1 = none yet
         ("turn", "i4"),  # which of the two last frames is the last

@@ -71,6 +71,7 @@ def _compare(env_id, seeds, policy, config, shield, max_steps, until) -> Compari
     decisions = episodes = 0
     for seed in seeds:
         rng = np.random.default_rng([seed, 99])
+        before = len(discrete)
         seen, _ = stock.reset(seed=seed)
         engine.seed([seed])
         out = engine.reset()
@@ -90,7 +91,7 @@ def _compare(env_id, seeds, policy, config, shield, max_steps, until) -> Compari
                 discrete.append(f"{here}: ends {terminated, truncated}, {out.terminated[0], out.truncated[0]}")
             if shield:
                 _compare_info(info, step_infos(out.steps, engine.scenario, settings), here, discrete)
-            if terminated or truncated or discrete:
+            if terminated or truncated or len(discrete) > before:
                 break
         episodes += 1
         if until and until(decisions):
@@ -129,6 +130,9 @@ def _compare_state(env, engine, where, worst, discrete) -> None:
         if hasattr(user, "target_lane_index"):
             flags["target_lane"] = indices[user.target_lane_index]
             numbers["target_speed"] = user.target_speed
+            flags["yields"] = getattr(user, "is_yielding", False)
+            if user.route is not None:
+                flags["route_step"] = _steps(engine, car) - len(user.route)
         if hasattr(user, "speed_index"):
             flags["speed_index"] = user.speed_index
         if car["kind"] == TRAFFIC:
@@ -140,8 +144,15 @@ def _compare_state(env, engine, where, worst, discrete) -> None:
         for name, value in flags.items():
             if value != car[name]:
                 discrete.append(f"{where}: car {i} {name} {value} {car[name]}")
+    if getattr(road, "steps", 0) != episode["road_frames"]:
+        discrete.append(f"{where}: {road.steps} frames of the road, {episode['road_frames']}")
     if road.np_random.bit_generator.state != generator_state(episode):
         discrete.append(f"{where}: random generator")
+
+
+def _steps(engine, car):
+    """Length of the route that a car planned."""
+    return (engine.scenario.network.route_roads[car["route"]] >= 0).sum()
 
 
 def _compare_observation(seen, out, worst) -> None:

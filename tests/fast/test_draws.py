@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from envs.fast.draws import GENERATOR, generator_state, integers, load_generator, normal, random, uniform
+from envs.fast.draws import GENERATOR, generator_state, integers, load_generator, normal, random, two_of, uniform
 
 
 @njit
@@ -21,13 +21,16 @@ def _draw(generators, kinds, out):
             out[i] = integers(rng, 1)
         elif kinds[i] == 4:
             out[i] = random(rng)
+        elif kinds[i] == 5:
+            first, second = two_of(rng, 4)
+            out[i] = 10 * first + second
         else:
             out[i] = integers(rng, 3_000_000_000)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2**40])
 def test_a_mix_of_draws_is_that_of_numpy(seed):
-    kinds = np.random.default_rng(1).integers(6, size=50_000)
+    kinds = np.random.default_rng(1).integers(7, size=50_000)
     rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
     generator = np.zeros(1, np.dtype(GENERATOR, align=True))
     load_generator(generator[0], rng.bit_generator)
@@ -38,7 +41,8 @@ def test_a_mix_of_draws_is_that_of_numpy(seed):
         1: lambda: rng.choice(3),
         2: lambda: rng.normal(),
         4: lambda: rng.random(),
-        5: lambda: rng.integers(3_000_000_000),
+        5: lambda: rng.choice(range(4), size=2, replace=False) @ (10, 1),
+        6: lambda: rng.integers(3_000_000_000),
     }
     theirs = np.array([0 if kind == 3 else draws[kind]() for kind in kinds], float)
     assert np.array_equal(ours, theirs)

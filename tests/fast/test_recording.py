@@ -3,11 +3,18 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from lockstep import stock_drivers
 
 import envs
 from envs.fast.replay import read, show
 
 ENV = "highway-fast-v0"
+
+
+@pytest.fixture(autouse=True)
+def _stock_drivers():
+    with stock_drivers():
+        yield
 
 
 def test_chosen_environments_are_recorded_frame_by_frame():
@@ -26,7 +33,7 @@ def test_chosen_environments_are_recorded_frame_by_frame():
     assert len(env.recording.running(2).cars) == 1
 
 
-@pytest.mark.parametrize("env_id", [ENV, "merge-v0", "exit-v0", "roundabout-v0"])
+@pytest.mark.parametrize("env_id", [ENV, "merge-v0", "exit-v0", "roundabout-v0", "intersection-v0"])
 def test_a_loaded_state_goes_on_like_the_engine(env_id):
     fast = envs.make_vec(env_id, 1, shield=None)
     fast.reset(seed=4)
@@ -34,7 +41,7 @@ def test_a_loaded_state_goes_on_like_the_engine(env_id):
     stock = gym.make(env_id).unwrapped
     stock.reset(seed=0)
     show(stock, fast.engine.batch.cars[0], fast.scenario.network, fast.engine.batch.episodes[0])
-    for action in (1, 0, 3):
+    for action in (1, 0, stock.action_type.actions_indexes["FASTER"]):
         seen, reward, *_ = stock.step(action)
         observations, rewards, *_ = fast.step(np.array([action]))
         np.testing.assert_allclose(seen, observations[0], atol=1e-6)
