@@ -82,7 +82,7 @@ class Config:
     arms: tuple[str, ...] = ("unshielded", "shielded")
     """What to train: unshielded (the shield only watches), shielded (it overrides), or both."""
     total_timesteps: int = 200_000
-    """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 2048."""
+    """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 8192."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds; each trains every arm once."""
     preset: str = "simulator"
@@ -98,7 +98,7 @@ class Config:
     """Test episodes per trained model and test condition, on the same seeds for all."""
     replay_episodes: int = 5
     """How many of these are played again on the original simulator and compared; none if it is the backend."""
-    n_envs: int = 64
+    n_envs: int = 128
     """Environments side by side in each training."""
     workers: int = os.cpu_count() or 1
     """Processes that share the trainings and tests. Results do not depend on it."""

@@ -19,21 +19,23 @@ import torch
 from gymnasium.vector import VectorEnv
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
+from stable_baselines3.common.utils import FloatSchedule
 
 from agents.curve import CurveRecorder, truncate_curve
 from agents.vec_env import VectorEnvAdapter
 
-# Network, epochs, learning rate and discount are the published starting point for PPO on highway-env
-# (its script sb3_highway_ppo.py); rollouts and batches are larger, for many environments side by side.
-ROLLOUT_STEPS = 2048  # decisions of all environments together between two updates
+# For many environments side by side, and a few hundred thousand decisions
+ROLLOUT_STEPS = 8192  # decisions of all environments together between two updates, at most
+UPDATES = 10  # at least
 BATCHES = 8  # in one pass over a rollout
+LEARNING_RATE = 1e-3  # at the start; falls to nothing, block by block
 HYPERPARAMETERS: dict[str, Any] = dict(
-    policy_kwargs={"net_arch": {"pi": [256, 256], "vf": [256, 256]}},
+    policy_kwargs={"net_arch": {"pi": [128, 128], "vf": [128, 128]}},
     n_epochs=10,
-    learning_rate=5e-4,
-    gamma=0.8,
+    learning_rate=LEARNING_RATE,
+    gamma=0.9,
 )
-ROLLOUTS_PER_BLOCK = 10  # a kill loses at most this many rollouts
+ROLLOUTS_PER_BLOCK = 3  # a kill loses at most this many rollouts
 
 
 def train(
@@ -85,6 +87,7 @@ def train(
         while model.num_timesteps < total_timesteps:
             model.set_random_seed(block_seed(seed, model.num_timesteps))
             model.set_env(env, force_reset=True)
+            model.lr_schedule = FloatSchedule(LEARNING_RATE * (1 - model.num_timesteps / total_timesteps))
             remaining = total_timesteps - model.num_timesteps
             model.learn(min(block_steps, remaining), callback=recorder, reset_num_timesteps=False)
             _save(model, checkpoint)
@@ -116,12 +119,12 @@ def load_policy(path: Path) -> Callable[[np.ndarray], np.ndarray]:
 def rollout_steps(n_envs: int, total_timesteps: int) -> int:
     """Decisions per environment between two updates.
 
-    About ROLLOUT_STEPS / n_envs, and no more than total_timesteps needs; a multiple of BATCHES, so that
-    all batches have one size.
+    A multiple of BATCHES, so that all batches have one size, and so many that rollouts are as large as
+    ROLLOUT_STEPS and UPDATES permit.
     """
-    wanted = ROLLOUT_STEPS // n_envs // BATCHES
-    needed = math.ceil(total_timesteps / (n_envs * BATCHES))
-    return max(min(wanted, needed), 1) * BATCHES
+    largest = ROLLOUT_STEPS // n_envs // BATCHES
+    enough = math.ceil(total_timesteps / UPDATES / (n_envs * BATCHES))
+    return max(min(largest, enough), 1) * BATCHES
 
 
 def rounded_timesteps(n_envs: int, total_timesteps: int) -> int:

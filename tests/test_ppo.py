@@ -1,6 +1,7 @@
 """Training: what is written, and that a kill at any point changes nothing."""
 
 import csv
+import functools
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import torch
 from stable_baselines3 import PPO
 
 import agents.ppo
+import envs
 from agents.curve import COLUMNS, truncate_curve
 from agents.ppo import block_seed, load_policy, rollout_steps, rounded_timesteps, train
 from tests.fake_env import BRAKE, FakeEnv, fake_vec
@@ -69,6 +71,23 @@ def test_a_killed_and_resumed_training_gives_the_same_result_bit_for_bit(uninter
     assert rows_of(tmp_path) == rows_of(uninterrupted)
 
 
+def test_a_training_on_the_engine_that_was_killed_goes_on_as_if_nothing_had_been(tmp_path):
+    make_vec = functools.partial(envs.make_vec, "highway-fast-v0", shield="override")
+    options = dict(seed=5, total_timesteps=512, n_envs=2)
+    train(make_vec, tmp_path / "left alone", **options)
+
+    def kill(timesteps):
+        if timesteps >= 100:
+            raise Killed
+
+    with pytest.raises(Killed):
+        train(make_vec, tmp_path / "killed", progress=kill, **options)
+    assert (tmp_path / "killed" / "checkpoint.zip").exists()
+    train(make_vec, tmp_path / "killed", **options)
+    assert torch.equal(weights(tmp_path / "killed" / "model.zip"), weights(tmp_path / "left alone" / "model.zip"))
+    assert rows_of(tmp_path / "killed") == rows_of(tmp_path / "left alone") != []
+
+
 def test_parallel_environments_give_the_same_result_twice(tmp_path):
     for name in ("first", "second"):
         train(fake_vec, tmp_path / name, seed=1, total_timesteps=64, n_envs=2)
@@ -112,10 +131,10 @@ def test_a_row_cut_short_by_a_kill_is_dropped(tmp_path):
 @pytest.mark.parametrize("n_envs", [1, 2, 3, 5, 6, 16, 100])
 @pytest.mark.parametrize("total", [1, 64, 50_000])
 def test_batches_are_equal_and_totals_are_whole_rollouts(monkeypatch, n_envs, total):
-    monkeypatch.setattr(agents.ppo, "ROLLOUT_STEPS", 2048)
+    monkeypatch.setattr(agents.ppo, "ROLLOUT_STEPS", 8192)
     rollout = n_envs * rollout_steps(n_envs, total)
     assert rollout % agents.ppo.BATCHES == 0
-    assert rollout <= max(2048, agents.ppo.BATCHES * n_envs)
+    assert rollout <= max(8192, agents.ppo.BATCHES * n_envs)
     assert total <= rounded_timesteps(n_envs, total) < total + rollout
 
 
