@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from eval.rollout import MakeEnv, run_episode
+from eval.rollout import MakeEnv, Policy, run_episode
 
 TOLERANCE = 1e-6  # of the return
 KEYS = ["train", "test", "train_seed", "seed"]
@@ -38,12 +38,16 @@ def replay(
     """
     records = []
     for seed, actions in zip(episodes["seed"], episodes["actions"].astype(str), strict=True):
-        recorded = [int(action) for action in actions.split()]
-        # an episode that is longer on the original simulator goes on with its last action
-        upcoming = itertools.chain(recorded, itertools.repeat(recorded[-1]))
-        records.append(run_episode(make_env, lambda _, upcoming=upcoming: next(upcoming), int(seed)))
+        records.append(run_episode(make_env, _playback(actions), int(seed)))
         progress(len(records))
     return pd.DataFrame(records)
+
+
+def _playback(actions: str) -> Policy:
+    """Takes the recorded actions one by one, and the last one again if the episode turns out longer."""
+    recorded = [int(action) for action in actions.split()]
+    upcoming = itertools.chain(recorded, itertools.repeat(recorded[-1]))
+    return lambda observation: next(upcoming)
 
 
 def compare(episodes: pd.DataFrame, replays: pd.DataFrame) -> pd.DataFrame:

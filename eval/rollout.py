@@ -40,8 +40,9 @@ def evaluate(
     envs = min(n_envs, len(seeds))
     env = make_vec(envs)
     records: dict[int, dict[str, Any]] = {}  # by index into seeds
-    playing, upcoming = np.arange(envs), itertools.count(envs)  # indices into seeds; from len(seeds) on: nothing
-    returns, speeds, actions = np.zeros(envs), np.zeros(envs), [[] for _ in range(envs)]
+    playing, upcoming = list(range(envs)), itertools.count(envs)  # indices into seeds; beyond: nothing is left
+    returns, speeds = np.zeros(envs), np.zeros(envs)
+    actions: list[list[int]] = [[] for _ in range(envs)]
     try:
         observations, _ = env.reset(seed=[int(seed) for seed in seeds[:envs]])
         while len(records) < len(seeds):
@@ -54,10 +55,10 @@ def evaluate(
             ended = terminated | truncated
             if not ended.any():
                 continue
-            for e in np.flatnonzero(ended):
+            for e in np.flatnonzero(ended).tolist():
                 if playing[e] < len(seeds):
                     record = _record(seeds[playing[e]], returns[e], speeds[e], len(actions[e]), _info(infos, e))
-                    records[int(playing[e])] = record | {"actions": " ".join(map(str, actions[e]))}
+                    records[playing[e]] = record | {"actions": " ".join(map(str, actions[e]))}
                 playing[e] = next(upcoming)
                 returns[e], speeds[e], actions[e] = 0.0, 0.0, []
             progress(len(records))

@@ -18,7 +18,7 @@ from PIL import Image
 from shield.params import RSSParams
 
 SCRIPT = Path(__file__).parent.parent / "train.py"
-TINY = "--total-timesteps 64 --seeds 0 --eval-episodes 3 --replay-episodes 1 --n-envs 2 --workers 2".split()
+TINY = ["--total-timesteps", "64", "--seeds", "0", "--eval-episodes", "3", "--replay-episodes", "1", "--n-envs", "2"]
 CELLS = [("off", "off"), ("off", "on"), ("on", "off"), ("on", "on")]
 
 
