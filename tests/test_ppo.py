@@ -121,6 +121,13 @@ def test_a_loaded_policy_acts_as_stable_baselines3_would(uninterrupted):
     assert np.array_equal(load_policy(uninterrupted / "model.zip")(observations), expected)
 
 
+def test_a_loaded_policy_does_not_depend_on_the_size_of_the_batch(uninterrupted):
+    policy = load_policy(uninterrupted / "model.zip")
+    observations = np.random.default_rng(0).uniform(-10, 10, (300, 2)).astype(np.float32)
+    alone = [policy(observation[None])[0] for observation in observations]
+    assert np.array_equal(policy(observations), alone)
+
+
 def test_a_row_cut_short_by_a_kill_is_dropped(tmp_path):
     path = tmp_path / "curve.csv"
     path.write_text(",".join(COLUMNS) + "\n10,1.0,5,0,,0.0,0.0\n30,1.0,5,0,,0.0,0.0\n1")

@@ -1,11 +1,14 @@
 """Episodes on fixed seeds, against a fake environment whose every number is known."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pandas as pd
 import pytest
+from gymnasium.vector import AutoresetMode
 
+import envs
 from eval.rollout import evaluate, run_episode
 from tests.fake_env import BRAKE, FakeEnv, brake, go, untouched_vec
 
@@ -69,6 +72,16 @@ def test_the_number_of_environments_changes_nothing(n_envs):
     one = evaluate(untouched_vec, brake_late, seeds, n_envs=1)
     assert one["length"].nunique() > 2
     pd.testing.assert_frame_equal(evaluate(untouched_vec, brake_late, seeds, n_envs=n_envs), one)
+
+
+@pytest.mark.parametrize("n_envs", [1, 2, 6])
+def test_nor_does_it_in_the_engine(n_envs):
+    def faster_or_left(observations):
+        return np.where(observations[:, 1, 1] < 0.15, 0, 3)  # where a car is close ahead, a lane to the left
+
+    make_vec = partial(envs.make_vec, "highway-fast-v0", shield="override", autoreset_mode=AutoresetMode.DISABLED)
+    expected = evaluate(make_vec, faster_or_left, range(6), n_envs=4)
+    pd.testing.assert_frame_equal(evaluate(make_vec, faster_or_left, range(6), n_envs=n_envs), expected)
 
 
 def test_progress_counts_episodes_up_to_all_of_them():
