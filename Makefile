@@ -15,9 +15,9 @@ PYTEST_ARGS ?= -n 2
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
 	@echo
-	@echo "  PYTHON=$(PYTHON) makes the environment; ARGS='--total-timesteps 20000' goes to train.py."
+	@echo "  PYTHON=$(PYTHON) makes the environment; ARGS='--total-timesteps 1000000' goes to train.py."
 
-compare: $(VENV)/installed  ## train and compare shielded with unshielded PPO (about 10 minutes)
+compare: $(VENV)/installed  ## train and compare shielded with unshielded PPO (minutes)
 	$(BIN)/python train.py $(ARGS)
 
 test: $(VENV)/installed-dev  ## run every test

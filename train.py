@@ -5,25 +5,31 @@ import functools
 import io
 import math
 import multiprocessing
+import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NoReturn
 
+import gymnasium as gym
 import tyro
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 import envs
 from agents.ppo import available_devices, load_policy, rounded_timesteps, train
-from eval.progress import move_to, progress_bar
-from eval.report import cell_path, write_cell, write_report
+from envs.vector import BACKENDS
+from eval.jobs import Job, run_jobs
+from eval.replay import chosen, replay
+from eval.report import cell_path, read_cell, replay_path, write_cell, write_report
 from eval.rollout import evaluate
 from eval.run_folder import open_run
 from shield.params import PRESETS, Preset, RSSParams, Rules
 
 TRAIN_MODE = {"unshielded": "monitor", "shielded": "override"}  # what the shield does in training
 TEST_MODE = {"off": "monitor", "on": "override"}  # a monitor assigns blame and changes nothing
+TEST_ENVS = {"fast": 256, "highway-env": 1}  # side by side in testing; the engine is the faster, the more there are
 HELP = """Train PPO with and without the RSS shield, test each with and without it, report who crashes.
 
 One table at the end: shield {off, on} in training x {off, on} in testing. Everything is written
@@ -31,9 +37,11 @@ to runs/NAME.
 
 examples:
   python train.py
-      the comparison with its defaults, about 10 minutes on 2 cores
-  python train.py --total-timesteps 50000 --seeds 0 1 2 --eval-episodes 200
+      the comparison with its defaults: 3 seeds, 200 000 decisions per arm and seed
+  python train.py --total-timesteps 1000000 --seeds 0 1 2 3 4
       the same with more of everything
+  python train.py --backend highway-env --total-timesteps 5376 --n-envs 2 --seeds 0 --eval-episodes 60
+      on the original simulator, with much less of everything
   python train.py --env-id merge-v0 --preset slides
       another road, stricter assumptions
   python train.py --ego.response-time 0.5 --other.a-min-brake 4
@@ -43,6 +51,7 @@ examples:
   python train.py --resume
       go on with a run that was stopped, with the options it was started with
 """
+Progress = Callable[[int], None]
 FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
 
 
@@ -68,11 +77,13 @@ class Config:
 
     env_id: str = "highway-fast-v0"
     """Environment of highway-env."""
+    backend: str = "fast"
+    """What simulates: fast (the compiled engine, with the same trajectories) or highway-env (the original)."""
     arms: tuple[str, ...] = ("unshielded", "shielded")
     """What to train: unshielded (the shield only watches), shielded (it overrides), or both."""
-    total_timesteps: int = 5376
-    """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 768."""
-    seeds: tuple[int, ...] = (0,)
+    total_timesteps: int = 200_000
+    """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 8192."""
+    seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds; each trains every arm once."""
     preset: str = "simulator"
     """RSS parameters by name: simulator, slides, ad-rss, carla, rodionova-conservative,
@@ -83,10 +94,14 @@ class Config:
     """RSS parameters assumed of everybody else that replace the preset's."""
     intervention_penalty: float = 0.0
     """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward."""
-    eval_episodes: int = 60
+    eval_episodes: int = 1000
     """Test episodes per trained model and test condition, on the same seeds for all."""
-    n_envs: int = 2
-    """Environments stepped in parallel in training; test episodes played in parallel."""
+    replay_episodes: int = 5
+    """How many of these are played again on the original simulator and compared; none if it is the backend."""
+    n_envs: int = 128
+    """Environments side by side in each training."""
+    workers: int = os.cpu_count() or 1
+    """Processes that share the trainings and tests. Results do not depend on it."""
     device: str = "cpu"
     """Where PPO learns: cpu, cuda or auto. For networks this small the CPU is faster."""
     name: str = ""
@@ -104,11 +119,9 @@ def main(arguments: list[str]) -> None:
     check(config)
     try:
         preset = resolve(config)
-        make_env = {
-            mode: functools.partial(envs.make, config.env_id, shield=mode, params=preset) for mode in TEST_MODE.values()
-        }
-        for make in make_env.values():
-            make().close()  # a bad value shows now
+        for mode in TEST_MODE.values():
+            original(config, preset, mode)().close()  # a bad value shows now
+        batch(config, preset, "override", n_envs=1).reset(seed=0)  # and the engine is compiled once for all workers
         folder = config.runs_dir / (config.name or run_name(config))
         changes = open_run(folder, record(config, preset), resume=config.resume, overwrite=config.overwrite)
     except (ValueError, OSError) as error:
@@ -116,36 +129,78 @@ def main(arguments: list[str]) -> None:
     for change in changes:
         print(f"train.py: warning: {change}", file=sys.stderr)
 
-    trained = [(arm, seed) for seed in config.seeds for arm in config.arms]
-    for arm, seed in trained:
-        total = rounded_timesteps(config.n_envs, config.total_timesteps)
-        with progress_bar(total, f"train {arm}, seed {seed}", "step") as bar:
-            train(
-                functools.partial(make_env[TRAIN_MODE[arm]], intervention_penalty=config.intervention_penalty),
-                folder / f"{arm}-seed{seed}",
-                seed=seed,
-                total_timesteps=config.total_timesteps,
-                n_envs=config.n_envs,
-                device=config.device,
-                progress=functools.partial(move_to, bar),
-            )
-
-    for arm, seed in trained:
-        for test in TEST_MODE:
-            path = cell_path(folder, arm, seed, test)
-            if path.exists():
-                continue
-            episodes = evaluate(
-                make_env[TEST_MODE[test]],
-                functools.partial(load_policy, folder / f"{arm}-seed{seed}" / "model.zip"),
-                range(FIRST_TEST_SEED, FIRST_TEST_SEED + config.eval_episodes),
-                n_workers=config.n_envs,
-                description=f"test {arm}, seed {seed}, shield {test}",
-            )
-            write_cell(path, episodes, arm, seed, test)
+    models = [(arm, seed) for seed in config.seeds for arm in config.arms]
+    cells = [(arm, seed, test) for arm, seed in models for test in TEST_MODE]
+    untrained = [model for model in models if not model_path(folder, *model).exists()]
+    run_jobs([training(config, preset, folder, *model) for model in untrained], config.workers)
+    untested = [cell for cell in cells if not cell_path(folder, *cell).exists()]
+    run_jobs([testing(config, preset, folder, *cell) for cell in untested], config.workers)
+    if config.backend == "fast" and config.replay_episodes:
+        unchecked = [cell for cell in cells if not replay_path(folder, *cell).exists()]
+        run_jobs([replaying(config, preset, folder, *cell) for cell in unchecked], config.workers)
 
     write_report(folder)
     print(f"\nEverything is in {folder}: table.md, results.json, learning_curve.png, blame.png, ...")
+
+
+def original(config: Config, preset: Preset, mode: str) -> Callable[..., gym.Env]:
+    """Builds an environment of the original simulator."""
+    return functools.partial(envs.make, config.env_id, shield=mode, params=preset)
+
+
+def batch(config: Config, preset: Preset, mode: str, n_envs: int, **options: Any) -> VectorEnv:
+    """Environments of the chosen simulator side by side."""
+    return envs.make_vec(config.env_id, n_envs, shield=mode, backend=config.backend, params=preset, **options)
+
+
+def model_path(folder: Path, arm: str, seed: int) -> Path:
+    """The trained model; `train` puts it there when it is finished."""
+    return folder / f"{arm}-seed{seed}" / "model.zip"
+
+
+def training(config: Config, preset: Preset, folder: Path, arm: str, seed: int) -> Job:
+    total = rounded_timesteps(config.n_envs, config.total_timesteps)
+    return Job(f"train {arm}, seed {seed}", total, "step", functools.partial(_train, config, preset, folder, arm, seed))
+
+
+def testing(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str) -> Job:
+    work = functools.partial(_test, config, preset, folder, arm, seed, test)
+    return Job(f"test {arm}, seed {seed}, shield {test}", config.eval_episodes, "episode", work)
+
+
+def replaying(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str) -> Job:
+    count = min(config.replay_episodes, config.eval_episodes)
+    work = functools.partial(_replay, config, preset, folder, arm, seed, test)
+    return Job(f"replay {arm}, seed {seed}, shield {test}", count, "episode", work)
+
+
+def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, progress: Progress) -> None:
+    train(
+        functools.partial(batch, config, preset, TRAIN_MODE[arm], intervention_penalty=config.intervention_penalty),
+        model_path(folder, arm, seed).parent,
+        seed=seed,
+        total_timesteps=config.total_timesteps,
+        n_envs=config.n_envs,
+        device=config.device,
+        progress=progress,
+    )
+
+
+def _test(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:
+    episodes = evaluate(
+        functools.partial(batch, config, preset, TEST_MODE[test], autoreset_mode=AutoresetMode.DISABLED),
+        load_policy(model_path(folder, arm, seed)),
+        range(FIRST_TEST_SEED, FIRST_TEST_SEED + config.eval_episodes),
+        n_envs=TEST_ENVS[config.backend],
+        progress=progress,
+    )
+    write_cell(cell_path(folder, arm, seed, test), episodes, arm, seed, test)
+
+
+def _replay(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:
+    sample = chosen(read_cell(cell_path(folder, arm, seed, test)), config.replay_episodes, seed)
+    replays = replay(original(config, preset, TEST_MODE[test]), sample, progress)
+    write_cell(replay_path(folder, arm, seed, test), replays, arm, seed, test)
 
 
 def parse(arguments: list[str]) -> Config:
@@ -168,13 +223,16 @@ def check(config: Config) -> None:
     """Refuse what is out of range, naming option, value and range. RSS parameters: see `resolve`."""
     arms, presets, devices = list(TRAIN_MODE), list(PRESETS), available_devices()
     for option, good, expected in (
+        ("backend", config.backend in BACKENDS, f"one of {', '.join(BACKENDS)}"),
         ("arms", is_set_of(config.arms, arms), f"one or more of {', '.join(arms)}"),
         ("total_timesteps", config.total_timesteps >= 1, "at least 1"),
         ("seeds", is_set_of(config.seeds, range(2**32)), "different whole numbers, 0 to 2**32 - 1"),
         ("preset", config.preset in presets, f"one of {', '.join(presets)}"),
         ("intervention_penalty", 0 <= config.intervention_penalty < math.inf, "a number >= 0"),
         ("eval_episodes", config.eval_episodes >= 1, "at least 1"),
-        ("n_envs", 1 <= config.n_envs <= 256, "1 to 256"),
+        ("replay_episodes", config.replay_episodes >= 0, "at least 0"),
+        ("n_envs", 1 <= config.n_envs <= 4096, "1 to 4096"),
+        ("workers", 1 <= config.workers <= 256, "1 to 256"),
         ("device", config.device in devices, f"one of {', '.join(devices)} on this machine"),
         ("name", re.fullmatch(r"([\w=][\w=.,+-]*)?", config.name), "letters, digits and . , = + - _"),
         ("resume", not (config.resume and config.overwrite), "--resume or --overwrite, not both"),
@@ -235,7 +293,7 @@ def run_name(config: Config) -> str:
     return ",".join(parts)
 
 
-_NOT_RECORDED = ("name", "runs_dir", "resume", "overwrite")
+_NOT_RECORDED = ("workers", "name", "runs_dir", "resume", "overwrite")
 
 
 def _given(overrides: Overrides) -> dict[str, float]:
@@ -249,7 +307,7 @@ def fail(message: str) -> NoReturn:
 
 if __name__ == "__main__":
     # worker processes are forked from a server that has imported the slow packages once
-    multiprocessing.set_forkserver_preload(["envs", "agents.ppo", "eval.rollout"])
+    multiprocessing.set_forkserver_preload(["envs", "agents.ppo", "eval.jobs", "eval.rollout"])
     try:
         main(sys.argv[1:])
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""PPO on any gymnasium environment: train with checkpoints, go on after a kill, load as a policy.
+"""PPO on any vector environment: train with checkpoints, go on after a kill, load as a policy.
 
 Training proceeds in blocks of a few rollouts. A block starts by seeding every generator and resetting
 every environment from (seed, timesteps done), and ends by saving the model. So a block depends on
@@ -7,39 +7,39 @@ one that was left alone. The price: at the end of a block the unfinished episode
 bootstraps their value, so the estimate stays sound).
 """
 
-import functools
 import math
 import os
 import shutil
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import torch
+from gymnasium.vector import VectorEnv
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
-from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecMonitor
+from stable_baselines3.common.utils import FloatSchedule
 
 from agents.curve import CurveRecorder, truncate_curve
+from agents.vec_env import VectorEnvAdapter
 
-# The published starting point for PPO on highway-env (its script sb3_highway_ppo.py).
-BATCH_SIZE = 64
-ROLLOUT_STEPS = 12 * BATCH_SIZE  # decisions of all environments together between two updates
+# For many environments side by side, and a few hundred thousand decisions
+ROLLOUT_STEPS = 8192  # decisions of all environments together between two updates, at most
+UPDATES = 10  # at least
+BATCHES = 8  # in one pass over a rollout
+LEARNING_RATE = 1e-3  # at the start; falls to nothing, block by block
 HYPERPARAMETERS: dict[str, Any] = dict(
-    policy_kwargs={"net_arch": {"pi": [256, 256], "vf": [256, 256]}},
-    batch_size=BATCH_SIZE,
+    policy_kwargs={"net_arch": {"pi": [128, 128], "vf": [128, 128]}},
     n_epochs=10,
-    learning_rate=5e-4,
-    gamma=0.8,
+    learning_rate=LEARNING_RATE,
+    gamma=0.9,
 )
-ROLLOUTS_PER_BLOCK = 2  # a kill loses at most this many rollouts
+ROLLOUTS_PER_BLOCK = 3  # a kill loses at most this many rollouts
 
 
 def train(
-    make_env: Callable[[], gym.Env],
+    make_vec: Callable[[int], VectorEnv],
     folder: Path,
     *,
     seed: int,
@@ -54,10 +54,10 @@ def train(
     training episode in `learning_curve.csv`, and TensorBoard events in `tensorboard/`.
 
     Args:
-      make_env: builds one environment; must be picklable.
+      make_vec: builds that many environments, with autoreset in the same step.
       seed: fixes the network's first weights and every block.
       total_timesteps: decisions to learn from, rounded up to whole rollouts.
-      n_envs: environments stepped in parallel, one process each (1: in this process).
+      n_envs: environments stepped side by side.
       progress: called with the timesteps done so far.
 
     Returns:
@@ -70,14 +70,15 @@ def train(
     torch.set_num_threads(1)  # the order of a sum must not depend on the number of cores
     folder.mkdir(parents=True, exist_ok=True)
     n_steps = rollout_steps(n_envs, total_timesteps)
-    workers: list[Callable[[], gym.Env]] = [functools.partial(_make_in_worker, make_env)] * n_envs
-    env = VecMonitor(DummyVecEnv([make_env]) if n_envs == 1 else SubprocVecEnv(workers))
+    env = VectorEnvAdapter(make_vec(n_envs))
     try:
         if checkpoint.exists():
             model = PPO.load(checkpoint, env=env, device=device)
         else:
             shutil.rmtree(folder / "tensorboard", ignore_errors=True)
-            model = PPO("MlpPolicy", env, n_steps=n_steps, seed=seed, device=device, **HYPERPARAMETERS)
+            batch_size = n_steps * n_envs // BATCHES
+            options = {"n_steps": n_steps, "batch_size": batch_size, **HYPERPARAMETERS}
+            model = PPO("MlpPolicy", env, seed=seed, device=device, **options)
         truncate_curve(curve, model.num_timesteps)
         model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
         recorder = CurveRecorder(curve, progress)
@@ -86,6 +87,7 @@ def train(
         while model.num_timesteps < total_timesteps:
             model.set_random_seed(block_seed(seed, model.num_timesteps))
             model.set_env(env, force_reset=True)
+            model.lr_schedule = FloatSchedule(LEARNING_RATE * (1 - model.num_timesteps / total_timesteps))
             remaining = total_timesteps - model.num_timesteps
             model.learn(min(block_steps, remaining), callback=recorder, reset_num_timesteps=False)
             _save(model, checkpoint)
@@ -96,22 +98,33 @@ def train(
     return model_path
 
 
-def load_policy(path: Path) -> Callable[[np.ndarray], Any]:
-    """Load a trained model as a greedy policy: observation -> action. Runs on the CPU, one thread."""
+def load_policy(path: Path) -> Callable[[np.ndarray], np.ndarray]:
+    """Load a trained model as a greedy policy: observations `[B, ...]` -> discrete actions `[B]`.
+
+    Runs on the CPU, one thread, in double precision: rounding depends on B, and so must be far too
+    small to turn one action into another.
+    """
     torch.set_num_threads(1)
-    model = PPO.load(path, device="cpu")
-    return lambda observation: model.predict(observation, deterministic=True)[0][()]
+    policy = PPO.load(path, device="cpu").policy
+    logits = torch.nn.Sequential(policy.mlp_extractor.policy_net, policy.action_net).double()
+
+    def act(observations: np.ndarray) -> np.ndarray:
+        with torch.no_grad():
+            flat = torch.as_tensor(observations, dtype=torch.float64).flatten(1)
+            return logits(flat).argmax(dim=1).numpy()
+
+    return act
 
 
 def rollout_steps(n_envs: int, total_timesteps: int) -> int:
     """Decisions per environment between two updates.
 
-    About ROLLOUT_STEPS / n_envs, and no more than total_timesteps needs; whole batches in every case.
+    A multiple of BATCHES, so that all batches have one size, and so many that rollouts are as large as
+    ROLLOUT_STEPS and UPDATES permit.
     """
-    whole_batches = BATCH_SIZE // math.gcd(BATCH_SIZE, n_envs)
-    wanted = ROLLOUT_STEPS // n_envs // whole_batches
-    needed = math.ceil(total_timesteps / (n_envs * whole_batches))
-    return max(min(wanted, needed), 1) * whole_batches
+    largest = ROLLOUT_STEPS // n_envs // BATCHES
+    enough = math.ceil(total_timesteps / UPDATES / (n_envs * BATCHES))
+    return max(min(largest, enough), 1) * BATCHES
 
 
 def rounded_timesteps(n_envs: int, total_timesteps: int) -> int:
@@ -128,12 +141,6 @@ def block_seed(seed: int, timesteps: int) -> int:
 def available_devices() -> list[str]:
     """What `device` may be on this machine."""
     return ["auto", "cpu"] + (["cuda"] if torch.cuda.is_available() else [])
-
-
-def _make_in_worker(make_env: Callable[[], gym.Env]) -> gym.Env:
-    """Ctrl-C is the parent's business: it closes its workers, and needs them alive for that."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return make_env()
 
 
 def _paths(folder: Path) -> tuple[Path, Path, Path]:

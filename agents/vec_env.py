@@ -45,7 +45,7 @@ class VectorEnvAdapter(VecEnv):
         ended = terminated | truncated
         nothing: dict = {}
         list_of_infos = [nothing] * self.num_envs
-        for e in np.flatnonzero(ended):
+        for e in np.flatnonzero(ended).tolist():
             info = _one(infos["final_info"], e)
             info["terminal_observation"] = infos["final_obs"][e]
             info["TimeLimit.truncated"] = bool(truncated[e] and not terminated[e])

@@ -32,7 +32,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
 
       shield: dict of this step: `intervened`, `override_fraction` (share of the frames in which a
         duty toward somebody changed the command), `limited_fraction` (frames in which only the
-        always-on limits did), `proposed_action`, `acceleration_change` [m/s^2] and
+        always-on limits did), `proposed_action` (after a step), `acceleration_change` [m/s^2] and
         `steering_change` [rad] (largest), `dangerous`, `dangerous_pairs` and `broken_duties`
         (pair-frames), and for the pair nearest to danger `partner` (index in `road.vehicles`,
         static objects after them, -1 = nobody), `min_margin_lon`, `min_margin_lat` (gap minus
@@ -108,7 +108,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         observation, info = self.env.reset(seed=seed, options=options)
         _check_environment(self.env.unwrapped)
         self._attach()
-        info.update(self._info(StepTally(), proposed_action=None, cost=0.0))
+        info.update(self._info(StepTally(), cost=0.0))
         return observation, info
 
     def step(self, action):
@@ -120,7 +120,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         at_fault = not had_contact and ego.contact is not None and ego.contact["verdict"] in ("ego", "both")
         cost = 1.0 if tally.broken_duties or at_fault else 0.0
         ego.cost += cost
-        info.update(self._info(tally, proposed_action=action, cost=cost))
+        info.update(self._info(tally, cost=cost))
+        info["shield"]["proposed_action"] = action
         info["raw_reward"] = reward
         reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
         return observation, reward, terminated, truncated, info
@@ -130,7 +131,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         settings = _settings(self.params, self.rules, self.mode, 1 / env.config["simulation_frequency"])
         self._ego = ShieldedEgo(env.vehicle, settings, self.record)
 
-    def _info(self, tally: StepTally, proposed_action, cost: float) -> dict:
+    def _info(self, tally: StepTally, cost: float) -> dict:
         ego = self._ego
         frames = max(tally.frames, 1)
         return {
@@ -138,7 +139,6 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
                 "intervened": tally.overridden > 0,
                 "override_fraction": tally.overridden / frames,
                 "limited_fraction": tally.limited / frames,
-                "proposed_action": proposed_action,
                 "acceleration_change": tally.acceleration_change,
                 "steering_change": tally.steering_change,
                 "dangerous": tally.dangerous_pairs > 0,

@@ -13,22 +13,23 @@ from rich.console import Console
 from eval.files import atomic, write_json
 from eval.metrics import differences, summarise
 from eval.plots import plot_blame, plot_learning_curve
+from eval.replay import compare, verdict
 from eval.table import print_table, write_table
 
 SHIELD = {"unshielded": "off", "shielded": "on"}  # arm -> shield while training
 
 
 def write_report(folder: Path) -> None:
-    """Read episodes/*.csv and */learning_curve.csv of a run; print and write table, figures, results.
+    """Read episodes/*.csv, replays/*.csv and */learning_curve.csv of a run; print and write table, figures, results.
 
     Writes episodes.csv, results.json, table.txt, .md, .tex and .csv, learning_curve.png and .pdf,
-    blame.png and .pdf.
+    blame.png and .pdf; replays.csv if episodes were replayed.
     """
     config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
     arms, seeds = config["arms"], config["seeds"]
-    cells = [(arm, test, seed) for arm in arms for test in ("off", "on") for seed in seeds]
+    cells = [(arm, seed, test) for arm in arms for test in ("off", "on") for seed in seeds]
     episodes = pd.concat(
-        [read_cell(cell_path(folder, arm, seed, test)) for arm, test, seed in cells],
+        [read_cell(cell_path(folder, *cell)) for cell in cells],
         ignore_index=True,
     )
     curve = pd.concat(
@@ -39,15 +40,22 @@ def write_report(folder: Path) -> None:
         ],
         ignore_index=True,
     )
+    replayed = [path for path in (replay_path(folder, *cell) for cell in cells) if path.exists()]
+    compared = compare(episodes, pd.concat(map(read_cell, replayed), ignore_index=True)) if replayed else None
+    note = "" if compared is None else verdict(compared)
     summary = summarise(episodes)
     with atomic(folder / "episodes.csv") as temporary:
         episodes.to_csv(temporary, index=False)
+    if compared is not None:
+        with atomic(folder / "replays.csv") as temporary:
+            compared.to_csv(temporary, index=False)
     write_json(
         folder / "results.json",
         {
             "config": config,
             "cells": summary.to_dict("records"),
             "differences_to_first_cell": differences(episodes).to_dict("records"),
+            "replays": [] if compared is None else compared.to_dict("records"),
         },
     )
     n_seeds = f"{len(seeds)} training seed" + ("s" if len(seeds) > 1 else "")
@@ -55,15 +63,20 @@ def write_report(folder: Path) -> None:
         f"PPO on {config['env_id']}, RSS preset {config['preset']}, "
         f"{config['total_timesteps']} timesteps per arm, {n_seeds}"
     )
-    write_table(summary, folder, title)
+    write_table(summary, folder, title, note)
     plot_learning_curve(curve, folder, str(config["env_id"]))
     plot_blame(episodes, folder, str(config["env_id"]))
-    print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160))
+    print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160), note)
 
 
 def cell_path(folder: Path, arm: str, seed: int, test: str) -> Path:
     """The episodes of one trained model under one test condition."""
     return folder / "episodes" / f"{arm}-seed{seed}-test-{test}.csv"
+
+
+def replay_path(folder: Path, arm: str, seed: int, test: str) -> Path:
+    """Those of the episodes that were played again on the original simulator."""
+    return folder / "replays" / cell_path(folder, arm, seed, test).name
 
 
 def write_cell(path: Path, episodes: pd.DataFrame, arm: str, seed: int, test: str) -> None:

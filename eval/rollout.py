@@ -1,64 +1,76 @@
 """Drive a policy through episodes with fixed seeds; one record per episode."""
 
+import itertools
 import json
-import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
+import numpy as np
 import pandas as pd
-
-from eval.progress import progress_bar
 
 MakeEnv = Callable[[], Any]  # builds a gymnasium environment whose info has the shield's keys
 Policy = Callable[[Any], Any]  # observation -> action
 
 
 def evaluate(
-    make_env: MakeEnv,
-    make_policy: Callable[[], Policy],
+    make_vec: Callable[[int], Any],
+    policy: Callable[[np.ndarray], np.ndarray],
     seeds: Sequence[int],
     *,
-    n_workers: int = 1,
-    description: str = "evaluate",
+    n_envs: int = 1,
+    progress: Callable[[int], None] = lambda episodes: None,
 ) -> pd.DataFrame:
-    """Play one episode per seed, several at a time, with a progress bar.
+    """Play exactly one episode per seed, several side by side.
 
-    Every episode has an environment of its own, so its record depends on policy and seed alone, not
-    on the number of processes.
+    An environment whose episode ends takes the next seed, so the record of an episode depends on
+    policy and seed alone, not on `n_envs`.
 
     Args:
-      make_env, make_policy: build the environment and the policy; picklable when n_workers > 1.
+      make_vec: builds that many environments without autoreset (a `gymnasium.vector.VectorEnv` whose
+        `reset` takes a "reset_mask").
+      policy: observations `[E, ...]` -> actions `[E]`.
       seeds: one per episode.
-      n_workers: processes (1: this one).
+      n_envs: E.
+      progress: called with the episodes done so far.
 
     Returns:
-      One row per episode, in the order of `seeds`; columns as in `run_episode`.
+      One row per episode, in the order of `seeds`; columns as in `run_episode`, and actions: the
+      numbers of the actions, separated by spaces.
     """
-    records = []
-    with progress_bar(len(seeds), description, "episode") as bar:
-        if n_workers == 1:
-            policy = make_policy()
-            for seed in seeds:
-                records.append(run_episode(make_env, policy, seed))
-                bar.update()
-        else:
-            # forked or spawned from a clean process: this one may hold threads and a GPU
-            methods = multiprocessing.get_all_start_methods()
-            method = "forkserver" if "forkserver" in methods else "spawn"
-            context = multiprocessing.get_context(method)
-            with ProcessPoolExecutor(n_workers, context, _start_worker, (make_env, make_policy)) as pool:
-                for record in pool.map(_run_in_worker, seeds):
-                    records.append(record)
-                    bar.update()
-    return pd.DataFrame(records)
+    envs = min(n_envs, len(seeds))
+    env = make_vec(envs)
+    records: dict[int, dict[str, Any]] = {}  # by index into seeds
+    playing, upcoming = list(range(envs)), itertools.count(envs)  # indices into seeds; beyond: nothing is left
+    returns, speeds = np.zeros(envs), np.zeros(envs)
+    actions: list[list[int]] = [[] for _ in range(envs)]
+    try:
+        observations, _ = env.reset(seed=[int(seed) for seed in seeds[:envs]])
+        while len(records) < len(seeds):
+            chosen = policy(observations)
+            observations, rewards, terminated, truncated, infos = env.step(chosen)
+            returns += rewards
+            speeds += infos["speed"]
+            for e in range(envs):
+                actions[e].append(int(chosen[e]))
+            ended = terminated | truncated
+            if not ended.any():
+                continue
+            for e in np.flatnonzero(ended).tolist():
+                if playing[e] < len(seeds):
+                    record = _record(seeds[playing[e]], returns[e], speeds[e], len(actions[e]), _info(infos, e))
+                    records[playing[e]] = record | {"actions": " ".join(map(str, actions[e]))}
+                playing[e] = next(upcoming)
+                returns[e], speeds[e], actions[e] = 0.0, 0.0, []
+            progress(len(records))
+            next_seeds = [int(seeds[i % len(seeds)]) if end else None for i, end in zip(playing, ended, strict=True)]
+            observations, _ = env.reset(seed=next_seeds, options={"reset_mask": ended})
+    finally:
+        env.close()
+    return pd.DataFrame([records[i] for i in range(len(seeds))])
 
 
 def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
-    """Play one episode and return its record.
+    """Play one episode in an environment of its own and return its record.
 
     seed; return; length [decisions]; speed: mean of info["speed"] [m/s]; crashed: the car touched
     somebody; env_crashed: the simulator's own flag; blame: ego, both, other, inherited, none or
@@ -79,45 +91,38 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
             done = terminated or truncated
     finally:
         env.close()
+    return _record(seed, total_reward, total_speed, length, info)
+
+
+def _record(seed: int, total_reward: float, total_speed: float, length: int, info: dict[str, Any]) -> dict[str, Any]:
+    """The record of an episode from its sums and its last info."""
+    blame = str(info["blame"])
     return {
-        "seed": seed,
-        "return": total_reward,
+        "seed": int(seed),
+        "return": float(total_reward),
         "length": length,
-        "speed": total_speed / length,
-        "crashed": bool(info["blame"]) or bool(info["crashed"]),
+        "speed": float(total_speed) / length,
+        "crashed": bool(blame) or bool(info["crashed"]),
         "env_crashed": bool(info["crashed"]),
-        "blame": info["blame"],
-        "inherited": info["blame"] == "inherited",
+        "blame": blame,
+        "inherited": blame == "inherited",
         "cost": float(info["episode_cost"]),
         "override_share": float(info["override_share"]),
         "dangerous_pairs": int(info["episode_dangerous_pairs"]),
         "broken_duties": int(info["episode_broken_duties"]),
         "min_ttc": float(info["min_ttc"]),
-        "evidence": json.dumps(info["blame_evidence"], default=_plain) if info["blame"] else "",
+        "evidence": json.dumps(info["blame_evidence"], default=_plain) if blame else "",
+    }
+
+
+def _info(infos: dict[str, Any], e: int) -> dict[str, Any]:
+    """The info of environment `e` out of dictionaries of arrays `[E]`, without the "_name" marks."""
+    return {
+        name: _info(values, e) if isinstance(values, dict) else values[e]
+        for name, values in infos.items()
+        if not name.startswith("_")
     }
 
 
 def _plain(number: Any) -> Any:
     return number.item()  # numpy scalars
-
-
-_worker: dict[str, Any] = {}  # what a worker process needs for every episode
-
-
-def _start_worker(make_env: MakeEnv, make_policy: Callable[[], Policy]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
-    threading.Thread(target=_exit_with_parent, daemon=True).start()
-    _worker["make_env"] = make_env
-    _worker["policy"] = make_policy()
-
-
-def _exit_with_parent() -> None:
-    """A worker whose parent was killed must not wait for work for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def _run_in_worker(seed: int) -> dict[str, Any]:
-    return run_episode(_worker["make_env"], _worker["policy"], seed)

@@ -42,19 +42,23 @@ def with_interval(value: float, low: float, high: float, digits: int) -> str:
     return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
-def write_table(summary: pd.DataFrame, folder: Path, title: str) -> None:
-    """Write table.txt, table.md, table.tex (texts) and table.csv (numbers, tidy) into `folder`."""
+def write_table(summary: pd.DataFrame, folder: Path, title: str, note: str = "") -> None:
+    """Write table.txt, table.md, table.tex (texts) and table.csv (numbers, tidy) into `folder`.
+
+    `note` stands below the legend.
+    """
     frame = table_frame(summary)
     with atomic(folder / "table.txt") as temporary, open(temporary, "w", encoding="utf-8") as stream:
-        print_table(summary, title, Console(file=stream, width=160))
-    write_text(folder / "table.md", f"{title}\n\n{_markdown(frame)}\n\n{LEGEND}\n")
+        print_table(summary, title, Console(file=stream, width=160), note)
+    below = f"\n\n{note}" if note else ""
+    write_text(folder / "table.md", f"{title}\n\n{_markdown(frame)}\n\n{LEGEND}{below}\n")
     write_text(folder / "table.tex", _latex(frame))
     with atomic(folder / "table.csv") as temporary:
         summary.to_csv(temporary, index=False)
 
 
-def print_table(summary: pd.DataFrame, title: str, console: Console) -> None:
-    """Print the table and its legend; on a narrow terminal the cells become the columns."""
+def print_table(summary: pd.DataFrame, title: str, console: Console, note: str = "") -> None:
+    """Print the table, its legend and a note; on a narrow terminal the cells become the columns."""
     frame = table_frame(summary)
     table = _rich(frame, title)
     unbounded = console.options.update(max_width=10_000)
@@ -64,6 +68,8 @@ def print_table(summary: pd.DataFrame, title: str, console: Console) -> None:
         table = _rich(turned.rename_axis("train / test", axis=0).reset_index(), title)
     console.print(table)
     console.print(LEGEND, markup=False, highlight=False)
+    if note:
+        console.print("\n" + note, markup=False, highlight=False)
 
 
 def _rich(frame: pd.DataFrame, title: str) -> Table:

@@ -4,6 +4,8 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers import RecordEpisodeStatistics
 
 BRAKE = 1
 
@@ -48,17 +50,19 @@ class FakeEnv(gym.Env):
         }
 
 
-def go(observation):
-    return 0
+def fake_vec(num_envs: int, autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP) -> SyncVectorEnv:
+    """Several of them, as `envs.make_vec` makes them."""
+    return SyncVectorEnv([lambda: RecordEpisodeStatistics(FakeEnv())] * num_envs, autoreset_mode=autoreset_mode)
 
 
-def brake(observation):
-    return BRAKE
+def untouched_vec(num_envs: int) -> SyncVectorEnv:
+    """The same without autoreset, for testing."""
+    return fake_vec(num_envs, AutoresetMode.DISABLED)
 
 
-def make_go():
-    return go
+def go(observations):
+    return 0 if observations.ndim == 1 else np.zeros(len(observations), int)
 
 
-def make_brake():
-    return brake
+def brake(observations):
+    return BRAKE if observations.ndim == 1 else np.full(len(observations), BRAKE)

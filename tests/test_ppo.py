@@ -1,15 +1,18 @@
 """Training: what is written, and that a kill at any point changes nothing."""
 
 import csv
+import functools
 
+import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
 
 import agents.ppo
+import envs
 from agents.curve import COLUMNS, truncate_curve
 from agents.ppo import block_seed, load_policy, rollout_steps, rounded_timesteps, train
-from tests.fake_env import BRAKE, FakeEnv
+from tests.fake_env import BRAKE, FakeEnv, fake_vec
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +39,7 @@ def train_until(folder, stop_at: int, **options):
         if timesteps >= stop_at:
             raise Killed
 
-    return train(FakeEnv, folder, seed=3, total_timesteps=256, progress=progress, **options)
+    return train(fake_vec, folder, seed=3, total_timesteps=256, progress=progress, **options)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +48,7 @@ def uninterrupted(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(agents.ppo, "ROLLOUT_STEPS", 64)
         patch.setattr(agents.ppo, "ROLLOUTS_PER_BLOCK", 1)
-        train(FakeEnv, folder, seed=3, total_timesteps=256)
+        train(fake_vec, folder, seed=3, total_timesteps=256)
     return folder
 
 
@@ -63,26 +66,43 @@ def test_training_leaves_a_model_a_curve_and_tensorboard_events(uninterrupted):
 def test_a_killed_and_resumed_training_gives_the_same_result_bit_for_bit(uninterrupted, tmp_path, stop_at):
     with pytest.raises(Killed):
         train_until(tmp_path, stop_at)
-    train(FakeEnv, tmp_path, seed=3, total_timesteps=256)
+    train(fake_vec, tmp_path, seed=3, total_timesteps=256)
     assert torch.equal(weights(tmp_path / "model.zip"), weights(uninterrupted / "model.zip"))
     assert rows_of(tmp_path) == rows_of(uninterrupted)
 
 
+def test_a_training_on_the_engine_that_was_killed_goes_on_as_if_nothing_had_been(tmp_path):
+    make_vec = functools.partial(envs.make_vec, "highway-fast-v0", shield="override")
+    options = dict(seed=5, total_timesteps=512, n_envs=2)
+    train(make_vec, tmp_path / "left alone", **options)
+
+    def kill(timesteps):
+        if timesteps >= 100:
+            raise Killed
+
+    with pytest.raises(Killed):
+        train(make_vec, tmp_path / "killed", progress=kill, **options)
+    assert (tmp_path / "killed" / "checkpoint.zip").exists()
+    train(make_vec, tmp_path / "killed", **options)
+    assert torch.equal(weights(tmp_path / "killed" / "model.zip"), weights(tmp_path / "left alone" / "model.zip"))
+    assert rows_of(tmp_path / "killed") == rows_of(tmp_path / "left alone") != []
+
+
 def test_parallel_environments_give_the_same_result_twice(tmp_path):
     for name in ("first", "second"):
-        train(FakeEnv, tmp_path / name, seed=1, total_timesteps=64, n_envs=2)
+        train(fake_vec, tmp_path / name, seed=1, total_timesteps=64, n_envs=2)
     assert torch.equal(weights(tmp_path / "first" / "model.zip"), weights(tmp_path / "second" / "model.zip"))
 
 
 def test_another_seed_gives_another_result(uninterrupted, tmp_path):
-    train(FakeEnv, tmp_path, seed=4, total_timesteps=256)
+    train(fake_vec, tmp_path, seed=4, total_timesteps=256)
     assert not torch.equal(weights(tmp_path / "model.zip"), weights(uninterrupted / "model.zip"))
 
 
 def test_a_finished_training_is_not_repeated(uninterrupted):
     before = (uninterrupted / "model.zip").stat().st_mtime_ns
     done = []
-    train(FakeEnv, uninterrupted, seed=3, total_timesteps=256, progress=done.append)
+    train(fake_vec, uninterrupted, seed=3, total_timesteps=256, progress=done.append)
     assert (uninterrupted / "model.zip").stat().st_mtime_ns == before
     assert done == [256]
 
@@ -90,9 +110,22 @@ def test_a_finished_training_is_not_repeated(uninterrupted):
 def test_a_loaded_policy_is_greedy_and_repeats_itself(uninterrupted):
     policy = load_policy(uninterrupted / "model.zip")
     observation = FakeEnv().reset(seed=0)[0]
-    actions = {int(policy(observation)) for _ in range(20)}
+    actions = {int(policy(observation[None])[0]) for _ in range(20)}
     assert len(actions) == 1
     assert actions <= {0, BRAKE}
+
+
+def test_a_loaded_policy_acts_as_stable_baselines3_would(uninterrupted):
+    observations = np.random.default_rng(0).uniform(-10, 10, (500, 2))
+    expected, _ = PPO.load(uninterrupted / "model.zip", device="cpu").predict(observations, deterministic=True)
+    assert np.array_equal(load_policy(uninterrupted / "model.zip")(observations), expected)
+
+
+def test_a_loaded_policy_does_not_depend_on_the_size_of_the_batch(uninterrupted):
+    policy = load_policy(uninterrupted / "model.zip")
+    observations = np.random.default_rng(0).uniform(-10, 10, (300, 2)).astype(np.float32)
+    alone = [policy(observation[None])[0] for observation in observations]
+    assert np.array_equal(policy(observations), alone)
 
 
 def test_a_row_cut_short_by_a_kill_is_dropped(tmp_path):
@@ -103,18 +136,13 @@ def test_a_row_cut_short_by_a_kill_is_dropped(tmp_path):
 
 
 @pytest.mark.parametrize("n_envs", [1, 2, 3, 5, 6, 16, 100])
-@pytest.mark.parametrize("total", [1, 64, 5000])
-def test_rollouts_are_whole_batches_and_totals_whole_rollouts(monkeypatch, n_envs, total):
-    monkeypatch.setattr(agents.ppo, "ROLLOUT_STEPS", 768)
+@pytest.mark.parametrize("total", [1, 64, 50_000])
+def test_batches_are_equal_and_totals_are_whole_rollouts(monkeypatch, n_envs, total):
+    monkeypatch.setattr(agents.ppo, "ROLLOUT_STEPS", 8192)
     rollout = n_envs * rollout_steps(n_envs, total)
-    assert rollout % 64 == 0
-    assert rollout <= max(768, 64 * n_envs)
+    assert rollout % agents.ppo.BATCHES == 0
+    assert rollout <= max(8192, agents.ppo.BATCHES * n_envs)
     assert total <= rounded_timesteps(n_envs, total) < total + rollout
-
-
-def test_the_published_rollout_of_768_decisions_is_kept(monkeypatch):
-    monkeypatch.setattr(agents.ppo, "ROLLOUT_STEPS", 768)
-    assert [rollout_steps(n_envs, 10_000) * n_envs for n_envs in (1, 2, 4, 6)] == [768] * 4
 
 
 def test_blocks_have_different_seeds_that_leave_room_for_test_seeds():

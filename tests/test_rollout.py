@@ -1,11 +1,16 @@
 """Episodes on fixed seeds, against a fake environment whose every number is known."""
 
 import json
+from functools import partial
 
+import numpy as np
 import pandas as pd
+import pytest
+from gymnasium.vector import AutoresetMode
 
+import envs
 from eval.rollout import evaluate, run_episode
-from tests.fake_env import FakeEnv, brake, go, make_brake, make_go
+from tests.fake_env import BRAKE, FakeEnv, brake, go, untouched_vec
 
 
 def test_a_crash_is_recorded_with_its_numbers():
@@ -41,14 +46,46 @@ def test_an_episode_without_a_crash_runs_to_its_end():
     assert record["evidence"] == ""
 
 
+def brake_late(observations):
+    """Brakes at the place of the crash of every third kind of road."""
+    return np.where((observations[:, 1] % 3 == 0) & (observations[:, 0] > 1), BRAKE, 0)
+
+
 def test_records_come_in_the_order_of_the_seeds():
-    episodes = evaluate(FakeEnv, make_go, [5, 3, 8])
+    episodes = evaluate(untouched_vec, go, [5, 3, 8], n_envs=2)
     assert episodes["seed"].tolist() == [5, 3, 8]
     assert episodes["length"].tolist() == [3, 6, 6]
+    assert episodes["actions"].tolist() == ["0 0 0", "0 0 0 0 0 0", "0 0 0 0 0 0"]
 
 
-def test_the_number_of_processes_changes_nothing():
+@pytest.mark.parametrize("policy", [go, brake])
+def test_an_episode_side_by_side_with_others_has_the_record_of_one_alone(policy):
     seeds = range(100, 112)
-    pd.testing.assert_frame_equal(
-        evaluate(FakeEnv, make_brake, seeds, n_workers=1), evaluate(FakeEnv, make_brake, seeds, n_workers=2)
-    )
+    together = evaluate(untouched_vec, policy, seeds, n_envs=5).drop(columns="actions")
+    alone = pd.DataFrame([run_episode(FakeEnv, policy, seed) for seed in seeds])
+    pd.testing.assert_frame_equal(together, alone)
+
+
+@pytest.mark.parametrize("n_envs", [2, 3, 7, 12, 100])
+def test_the_number_of_environments_changes_nothing(n_envs):
+    seeds = range(100, 112)
+    one = evaluate(untouched_vec, brake_late, seeds, n_envs=1)
+    assert one["length"].nunique() > 2
+    pd.testing.assert_frame_equal(evaluate(untouched_vec, brake_late, seeds, n_envs=n_envs), one)
+
+
+@pytest.mark.parametrize("n_envs", [1, 2, 6])
+def test_nor_does_it_in_the_engine(n_envs):
+    def faster_or_left(observations):
+        return np.where(observations[:, 1, 1] < 0.15, 0, 3)  # where a car is close ahead, a lane to the left
+
+    make_vec = partial(envs.make_vec, "highway-fast-v0", shield="override", autoreset_mode=AutoresetMode.DISABLED)
+    expected = evaluate(make_vec, faster_or_left, range(6), n_envs=4)
+    pd.testing.assert_frame_equal(evaluate(make_vec, faster_or_left, range(6), n_envs=n_envs), expected)
+
+
+def test_progress_counts_episodes_up_to_all_of_them():
+    done = []
+    evaluate(untouched_vec, go, range(9), n_envs=4, progress=done.append)
+    assert done == sorted(done)
+    assert done[-1] == 9

@@ -3,6 +3,7 @@
 import json
 import os
 import runpy
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from PIL import Image
 from shield.params import RSSParams
 
 SCRIPT = Path(__file__).parent.parent / "train.py"
-TINY = ["--total-timesteps", "64", "--eval-episodes", "2", "--n-envs", "1"]
+TINY = ["--total-timesteps", "64", "--seeds", "0", "--eval-episodes", "3", "--replay-episodes", "1", "--n-envs", "2"]
 CELLS = [("off", "off"), ("off", "on"), ("on", "off"), ("on", "on")]
 
 
@@ -35,6 +36,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ("--backend slow", "--backend slow is out of range: expected one of fast, highway-env"),
         ("--arms foo", "--arms foo is out of range: expected one or more of unshielded, shielded"),
         ("--arms shielded shielded", "--arms shielded shielded is out of range: expected one or more of"),
         ("--total-timesteps 0", "--total-timesteps 0 is out of range: expected at least 1"),
@@ -44,13 +46,17 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--seeds -1", "--seeds -1 is out of range: expected different whole numbers"),
         ("--preset fast", "--preset fast is out of range: expected one of simulator, slides, ad-rss"),
         ("--eval-episodes 0", "--eval-episodes 0 is out of range: expected at least 1"),
-        ("--n-envs 0", "--n-envs 0 is out of range: expected 1 to 256"),
+        ("--replay-episodes -1", "--replay-episodes -1 is out of range: expected at least 0"),
+        ("--n-envs 0", "--n-envs 0 is out of range: expected 1 to 4096"),
+        ("--workers 0", "--workers 0 is out of range: expected 1 to 256"),
         ("--device abacus", "--device abacus is out of range: expected one of auto, cpu"),
         ("--name ../home", "--name ../home is out of range: expected letters, digits and"),
         ("--intervention-penalty nan", "--intervention-penalty nan is out of range: expected a number >= 0"),
         ("--resume --overwrite", "expected --resume or --overwrite, not both"),
         ("--env-id no-such-road", "'no-such-road'"),
         ("--env-id CartPole-v1", "CartPole"),
+        ("--env-id CartPole-v1 --backend highway-env", "CartPole"),
+        ("--env-id roundabout-v0", "environment RoundaboutEnv is not supported; expected one of highway-v0"),
         ("--ego.mu -1", "--ego: mu = -1.0 is out of range: expected a finite number >= 0"),
         ("--other.a-min-brake 7", "--other: a_min_brake = 7 is out of range: expected at most a_max_brake = 6"),
         ("--ego.response-time 0.01", "response_time = 0.01 s of the ego is shorter than one simulation frame"),
@@ -103,7 +109,7 @@ def test_given_parameters_replace_the_presets_and_nothing_else():
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A whole run on the real environment, in this process: (folder, what it printed)."""
+    """A whole run on the engine: (folder, what it printed)."""
     runs = tmp_path_factory.mktemp("runs")
     process = start(runs, "--name", "whole")
     output, _ = process.communicate(timeout=300)
@@ -125,6 +131,8 @@ def test_a_run_writes_everything_a_paper_needs(finished):
         "config.json",
         "episodes",
         "episodes.csv",
+        "replays",
+        "replays.csv",
         "results.json",
         "table.txt",
         "table.md",
@@ -152,17 +160,52 @@ def test_every_cell_of_a_run_plays_the_same_seeds(finished):
     episodes = pd.read_csv(folder / "episodes.csv", keep_default_na=False)
     seeds = {cell: list(rows["seed"]) for cell, rows in episodes.groupby(["train", "test"], sort=False)}
     assert list(seeds) == CELLS
-    assert list(seeds.values()) == [[10**9, 10**9 + 1]] * 4
+    assert list(seeds.values()) == [[10**9, 10**9 + 1, 10**9 + 2]] * 4
     assert (episodes.loc[episodes["test"] == "off", "override_share"] == 0).all()
     cells = json.loads((folder / "results.json").read_text())["cells"]
     assert len(cells) == 40
-    assert all(cell["n"] == 2 for cell in cells)
+    assert all(cell["n"] == 3 for cell in cells)
 
 
-def test_a_run_killed_twice_and_resumed_gives_the_same_episodes(finished, tmp_path):
+def test_a_sample_of_a_run_is_replayed_and_reported(finished):
+    folder, output = finished
+    assert "4 of 4 test episodes agree" in " ".join(output.split())
+    assert "4 of 4 test episodes agree" in (folder / "table.md").read_text()
+    assert "4 of 4 test episodes agree" in " ".join((folder / "table.txt").read_text().split())
+    replays = json.loads((folder / "results.json").read_text())["replays"]
+    assert [(replay["train"], replay["test"]) for replay in replays] == CELLS
+    assert all(replay["agrees"] for replay in replays)
+
+
+def test_an_episode_tampered_with_is_named_in_the_report(finished, tmp_path):
+    folder = shutil.copytree(finished[0], tmp_path / "tampered")
+    path = folder / "episodes" / "shielded-seed0-test-on.csv"
+    episode = pd.read_csv(folder / "replays" / path.name)["seed"].item()
+    episodes = pd.read_csv(path, keep_default_na=False)
+    episodes.loc[episodes["seed"] == episode, "length"] += 1
+    episodes.to_csv(path, index=False)
+    report = [sys.executable, "-m", "eval.report", str(folder)]
+    output = subprocess.run(report, cwd=SCRIPT.parent, text=True, capture_output=True, check=True).stdout
+    assert "3 of 4 test episodes agree" in " ".join(output.split())
+    assert f"DISAGREES: train on, test on, training seed 0, episode {episode}: length" in " ".join(output.split())
+
+
+def test_the_original_simulator_is_one_flag_away(tmp_path):
+    options = ["--backend", "highway-env", "--total-timesteps", "16", "--eval-episodes", "1", "--name", "original"]
+    process = start(tmp_path, *options)
+    output, _ = process.communicate(timeout=300)
+    assert process.returncode == 0, output
+    assert "Replayed" not in output
+    episodes = pd.read_csv(tmp_path / "original" / "episodes.csv", keep_default_na=False)
+    assert list(zip(episodes["train"], episodes["test"], strict=True)) == CELLS
+    assert not (tmp_path / "original" / "replays").exists()
+
+
+def test_a_run_killed_thrice_and_resumed_gives_the_same_episodes(finished, tmp_path):
     whole, _ = finished
     folder = tmp_path / "killed"
-    milestones = (folder / "unshielded-seed0" / "model.zip", folder / "episodes" / "unshielded-seed0-test-off.csv")
+    cell = "unshielded-seed0-test-off.csv"
+    milestones = (folder / "unshielded-seed0" / "model.zip", folder / "episodes" / cell, folder / "replays" / cell)
     kept = {}
     for milestone in milestones:
         process = start(tmp_path, "--name", "killed", "--resume")

@@ -1,0 +1,100 @@
+"""Run jobs in worker processes, each with a progress bar."""
+
+import multiprocessing
+import os
+import queue
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from typing import Any, NamedTuple
+
+from tqdm import tqdm
+
+from eval.progress import move_to, progress_bar
+
+_TICK = 0.2  # seconds between two looks at the news
+
+
+class Job(NamedTuple):
+    """Something to do that says how far it is."""
+
+    description: str
+    total: int  # what is to be done, in units
+    unit: str
+    work: Callable[..., Any]  # called with `progress`, a function of the units done; picklable
+
+
+class Stopped(Exception):
+    """Raised in a worker whose parent was interrupted."""
+
+
+def run_jobs(jobs: Sequence[Job], n_workers: int) -> None:
+    """Do all jobs, `n_workers` at a time (1: in this process).
+
+    Whatever a job raises is raised here; what the other jobs were doing is stopped.
+    """
+    if n_workers == 1 or len(jobs) <= 1:
+        for job in jobs:
+            with progress_bar(job.total, job.description, job.unit) as bar:
+                job.work(progress=lambda done, bar=bar: move_to(bar, done))
+        return
+    # forked or spawned from a clean process: this one may hold threads and a GPU
+    methods = multiprocessing.get_all_start_methods()
+    context: Any = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
+    news, stop = context.Queue(), context.Event()
+    bars: dict[int, tqdm] = {}
+    with ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (news, stop)) as pool:
+        try:
+            left = {pool.submit(_run_in_worker, i, job.work) for i, job in enumerate(jobs)}
+            while left:
+                finished, left = wait(left, _TICK, FIRST_COMPLETED)
+                _show(news, jobs, bars)
+                for done in finished:
+                    done.result()
+            _show(news, jobs, bars)
+        finally:
+            stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            for bar in bars.values():
+                bar.close()
+
+
+def _show(news: Any, jobs: Sequence[Job], bars: dict[int, tqdm]) -> None:
+    """Move the bars to where the jobs are. A bar appears when its job says something."""
+    while True:
+        try:
+            i, done = news.get_nowait()
+        except queue.Empty:
+            return
+        if i not in bars:
+            bars[i] = progress_bar(jobs[i].total, jobs[i].description, jobs[i].unit)
+        move_to(bars[i], done)
+        if done >= jobs[i].total:
+            bars[i].close()
+
+
+_worker: dict[str, Any] = {}  # how a worker process reports, and hears that it must stop
+
+
+def _start_worker(news: Any, stop: Any) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
+    _worker["news"], _worker["stop"] = news, stop
+
+
+def _exit_with_parent() -> None:
+    """A worker whose parent was killed must not go on for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _run_in_worker(i: int, work: Callable[..., Any]) -> None:
+    def progress(done: int) -> None:
+        _worker["news"].put((i, done))
+        if _worker["stop"].is_set():
+            raise Stopped
+
+    work(progress=progress)
