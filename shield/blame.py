@@ -50,6 +50,7 @@ DUTIES = (
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")
 
+_NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
 
 
@@ -206,7 +207,7 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
     pairs = broken = 0
     for i in range(len(users)):
         if memory[i].since > 0:
-            judge_motion(memory[i], ego, users[i], ego_params, other_params, 0, 0.0, dt)
+            judge_motion(memory[i], ego, users[i], ego_params, other_params, _NOW, 0.0, dt)
             duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
             _blame_ego(memory[i], duty, excess)
             pairs += 1
@@ -242,9 +243,9 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     pair = assess(ego, user, ego_params, other_params, rules, dt)
     remember(memory, pair, ego, user, dt)
     if memory.since > 0:
-        judge_motion(memory, ego, user, ego_params, other_params, 0, 0.0, dt)
+        judge_motion(memory, ego, user, ego_params, other_params, _NOW, 0.0, dt)
         # the simulator predicts contacts one frame ahead
-        judge_motion(memory, ego, user, ego_params, other_params, 1, rules.overlap_margin, dt)
+        judge_motion(memory, ego, user, ego_params, other_params, _NEXT_FRAME, rules.overlap_margin, dt)
     ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
     if memory.since == 0:
         verdict = NOBODY

@@ -1,19 +1,25 @@
 """How the engine is compiled, and when again."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from numba import njit
+from numba import config, njit
 
 from shield.compiled import fingerprint
 
 # Inner functions allocate nothing, so numba need not count references to the arrays they are handed.
 # Counting would cost far more than what they compute. They are compiled into the kernel, which alone
-# is cached. Functions that call those of `shield/`, which do allocate, are plain `njit`.
+# is cached.
 compiled = njit(_nrt=False, error_model="numpy")
 
 # Calls hand over tuples of arrays field by field. Where that would cost more than the work, the
 # function is merged into its caller.
 merged = njit(_nrt=False, error_model="numpy", forceinline=True)
+
+# The same for what has one caller only: it becomes part of its source and is never compiled alone,
+# which saves compile time.
+unfolded = njit(_nrt=False, error_model="numpy", inline="always")
 
 
 def kernel(function):
@@ -25,3 +31,14 @@ def kernel(function):
     here = Path(__file__).parent
     dispatcher._cache._cache_file._source_stamp = fingerprint(*here.glob("*.py"), here.parent / "highway.py")
     return dispatcher
+
+
+@contextmanager
+def compiling_quickly() -> Iterator[None]:
+    """Compile at LLVM's first level of optimisation: the kernel is ready sooner and runs as fast."""
+    level = config.OPT
+    config.OPT = type(level)(1)
+    try:
+        yield
+    finally:
+        config.OPT = level

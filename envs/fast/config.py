@@ -27,12 +27,12 @@ FEATURES = ("presence", "x", "y", "vx", "vy", "heading", "cos_h", "sin_h")
 
 CONFIG = np.dtype(
     [
-        ("scenario", "i4"),
+        ("scenario", "i8"),
         ("dt", "f8"),  # length of a frame [s]
-        ("frames", "i4"),  # per decision
+        ("frames", "i8"),  # per decision
         ("period", "f8"),  # length of a decision [s]
         ("duration", "f8"),  # of an episode [s], inf = unlimited
-        ("max_steps", "i4"),  # decisions of an episode, 0 = unlimited
+        ("max_steps", "i8"),  # decisions of an episode, 0 = unlimited
         ("offroad_terminal", "?"),
         ("meta_actions", "?"),  # else acceleration and steering
         ("max_speed", "f8"),  # of a directly driven ego [m/s]
@@ -50,25 +50,25 @@ CONFIG = np.dtype(
         ("delta_low", "f8"),
         ("delta_high", "f8"),
         # scene
-        ("traffic", "i4"),  # vehicles besides the ego
+        ("traffic", "i8"),  # vehicles besides the ego
         ("traffic_checks", "?"),  # they look for collisions themselves
-        ("ego_lane", "i4"),  # -1 = drawn
+        ("ego_lane", "i8"),  # -1 = drawn
         ("ego_spacing", "f8"),
         ("traffic_spacing", "f8"),
         ("lanes_factor", "f8"),  # more lanes, denser traffic
-        ("main_lane", "i4"),  # first lane of the road where the scene plays
-        ("side_lane", "i4"),  # where others come from
-        ("other_lane", "i4"),
-        ("destination", "i4"),  # of the incoming car, or the ego at an intersection; -1 = drawn
-        ("arm", "i4"),  # lanes from one entry of an intersection to the next
-        ("warm_up_frames", "i4"),  # before the ego appears
-        ("regulation_period", "i4"),  # frames between decisions on who yields, 0 = nobody does
+        ("main_lane", "i8"),  # first lane of the road where the scene plays
+        ("side_lane", "i8"),  # where others come from
+        ("other_lane", "i8"),
+        ("destination", "i8"),  # of the incoming car, or the ego at an intersection; -1 = drawn
+        ("arm", "i8"),  # lanes from one entry of an intersection to the next
+        ("warm_up_frames", "i8"),  # before the ego appears
+        ("regulation_period", "i8"),  # frames between decisions on who yields, 0 = nobody does
         ("spawn_probability", "f8"),  # of a new car after each decision
         ("obstacle_x", "f8"),  # [m]
         ("obstacle_y", "f8"),
         ("end_x", "f8"),  # the episode ends beyond it [m]
-        ("goal_lane", "i4"),  # reaching one of them is a success
-        ("other_goal_lane", "i4"),
+        ("goal_lane", "i8"),  # reaching one of them is a success
+        ("other_goal_lane", "i8"),
         # reward
         *[(f"weight_{k}", "f8") for k in range(REWARDS)],
         ("normalize_reward", "?"),
@@ -77,17 +77,17 @@ CONFIG = np.dtype(
         ("speed_low", "f8"),  # [m/s]
         ("speed_high", "f8"),
         # observation
-        ("observation", "i4"),
-        ("rows", "i4"),  # observed vehicles, the ego included
+        ("observation", "i8"),
+        ("rows", "i8"),  # observed vehicles, the ego included
         ("absolute", "?"),
         ("see_behind", "?"),
         ("obstacles", "?"),
         ("normalize", "?"),
         ("clips", "?"),
-        ("exit_lane", "i4"),  # the ego's x counts along it, -1 = along the world
-        ("speeds", "i4"),  # size of a time-to-collision grid
-        ("lanes", "i4"),
-        ("times", "i4"),
+        ("exit_lane", "i8"),  # the ego's x counts along it, -1 = along the world
+        ("speeds", "i8"),  # size of a time-to-collision grid
+        ("lanes", "i8"),
+        ("times", "i8"),
     ],
     align=True,
 )
@@ -266,13 +266,13 @@ def _fill_action(record, action_type) -> tuple[np.ndarray, np.ndarray]:
         record["meta_actions"], record["speeds"] = True, len(action_type.target_speeds)
         numbers = {label: number for number, label in DiscreteMetaAction.ACTIONS_ALL.items()}
         labels = [numbers[action_type.actions[k]] for k in range(len(action_type.actions))]
-        return np.asarray(action_type.target_speeds, float), np.array(labels, np.int32)
+        return np.asarray(action_type.target_speeds, float), np.array(labels, np.int64)
     if type(action_type) is ContinuousAction:
         if action_type.dynamical:
             raise Unsupported("action option dynamical = True", "False")
         if action_type.speed_range:
             record["min_speed"], record["max_speed"] = action_type.speed_range
-        return np.zeros(1), np.zeros(0, np.int32)
+        return np.zeros(1), np.zeros(0, np.int64)
     raise Unsupported(f"action type {type(action_type).__name__}", "DiscreteMetaAction or ContinuousAction")
 
 
@@ -306,7 +306,7 @@ def _fill_observation(record, env) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             ranges[k] = asked[name]
         elif not asked and name in defaults:
             ranges[k] = -defaults[name], defaults[name]
-    features = np.array([FEATURES.index(name) for name in seen.features], np.int32)
+    features = np.array([FEATURES.index(name) for name in seen.features], np.int64)
     return features, ranges, np.zeros((0, 0), bool)
 
 
@@ -321,7 +321,7 @@ def _fill_times(record, env) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     record["lanes"] = max(len(network.all_side_lanes(index)) for index in indices)
     record["times"] = env.observation_space.shape[2]
     connected = np.array([[network.is_connected_road(a, b, depth=3) for b in indices] for a in indices])
-    return np.zeros(0, np.int32), np.zeros((0, 2)), connected
+    return np.zeros(0, np.int64), np.zeros((0, 2)), connected
 
 
 def _lane_odds(given: dict) -> np.ndarray:

@@ -33,7 +33,7 @@ def decide(cars, episode, net, lanes, sight, idm):
       idm: CONFIG, parameters of the traffic.
     """
     n = episode.cars
-    changing = 0
+    changing = np.int64(0)
     for i in range(n):
         if cars[i].target_lane != cars[i].lane:
             sight.changing[changing] = i

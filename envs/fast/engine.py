@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.compiled import compiled, kernel
+from envs.fast.compiled import compiled, compiling_quickly, kernel, unfolded
 from envs.fast.config import INTERSECTION, Scenario
 from envs.fast.draws import load_generator
 from envs.fast.drivers import take_meta_action
@@ -33,7 +33,7 @@ from envs.fast.guard import (
 )
 from envs.fast.network import Network
 from envs.fast.observations import observe
-from envs.fast.rewards import is_terminated, is_truncated, rate
+from envs.fast.rewards import NO_ACTION, is_terminated, is_truncated, rate
 from envs.fast.scenes import make_scene
 from envs.fast.sight import make_sight, sort_along_x
 from envs.fast.state import CAR, EPISODE, STEP
@@ -115,7 +115,7 @@ def _restart(cars, episode, order, past, world, sight, watch, mode, step, out):
     sort_along_x(cars, episode.cars, order)
     start_watch(episode, past, watch)
     start_tally(step)
-    rate(cars, episode, -1, lanes, sight, config, step)
+    rate(cars, episode, NO_ACTION, lanes, sight, config, step)
     step.raw_reward = 0.0
     _report(cars, episode, mode, 0.0, step)
     _see(cars, episode, world, sight, out)
@@ -156,7 +156,7 @@ def _report(cars, episode, mode, cost, step):
         step.other_duty, step.other_excess = episode.other_duty, episode.other_excess
 
 
-@compiled
+@unfolded
 def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode, inputs, film, step):
     """One decision of one environment, frame by frame."""
     config, net = world.config[0], world.network
@@ -191,12 +191,9 @@ def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode,
 
 
 @kernel
-def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalty, autoreset):
+def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings, mode, penalty, autoreset):
     """One decision of the environments `first` to `last` - 1, resets included."""
     config, lanes = world.config[0], world.network.lanes
-    n = batch.cars.shape[1]
-    sight = make_sight(len(lanes), n, config.speeds, config.lanes, config.times)
-    watch = make_watch(settings.rules.heading_bound)
     for e in range(first, last):
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
         past, observation = Past(batch.memory[e], batch.before[e], batch.seen[e]), outputs.observations[e]
@@ -226,7 +223,8 @@ def run(first, last, world, batch, inputs, outputs, film, settings, mode, penalt
         if config.scenario == INTERSECTION:
             let_traffic_flow(cars, episode, order, world.network, config)
         if episode.ended and autoreset == SAME_STEP:
-            outputs.final_observations[e, :] = observation
+            for k in range(len(observation)):
+                outputs.final_observations[e, k] = observation[k]
             outputs.final_steps[e] = step
             _restart(cars, episode, order, past, world, sight, watch, mode, step, observation)
 
@@ -274,16 +272,20 @@ class Engine:
         self.batch = Batch(
             np.zeros((num_envs, n), CAR),
             np.zeros(num_envs, EPISODE),
-            np.zeros((num_envs, n), np.int32),
+            np.zeros((num_envs, n), np.int64),
             np.zeros((num_envs, watched), MEMORY),
             np.zeros((num_envs, watched, 2)),
             np.zeros((num_envs, 2, watched), ROAD_USER),
         )
-        self.film = Film(np.full(num_envs, -1, np.int32), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
+        self.film = Film(np.full(num_envs, -1, np.int64), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
         self._seen: np.ndarray | None = None  # last observations
         self._size = int(np.prod(scenario.observation_space.shape))
         self._shares = np.linspace(0, num_envs, threads + 1).astype(int)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        config = scenario.config[0]
+        sizes = len(scenario.network.lanes), n, config["speeds"], config["lanes"], config["times"]
+        self._sights = [make_sight(*sizes) for _ in range(threads)]
+        self._watch = make_watch(self.settings.rules.heading_bound)
 
     def seed(self, seeds) -> None:
         """Give environments the generators that highway-env would have.
@@ -300,7 +302,7 @@ class Engine:
         e = self.num_envs
         todo = np.full(e, RESTART, np.int8) if mask is None else np.where(mask, RESTART, STAY).astype(np.int8)
         seen = self._seen
-        outputs = self._run(Inputs(np.zeros(e, np.int32), np.zeros((e, 2)), todo))
+        outputs = self._run(Inputs(np.zeros(e, np.int64), np.zeros((e, 2)), todo))
         if seen is not None:  # traffic may have come and gone since
             outputs.observations[todo == STAY] = seen[todo == STAY]
         return outputs
@@ -309,11 +311,11 @@ class Engine:
         """One decision everywhere.
 
         Args:
-          actions: `[E]` int32 discrete actions, or
+          actions: `[E]` int64 discrete actions, or
           commands: `[E, 2]` acceleration [m/s^2] and steering [rad].
         """
         e = self.num_envs
-        actions = np.full(e, -1, np.int32) if actions is None else actions
+        actions = np.full(e, -1, np.int64) if actions is None else actions
         commands = np.zeros((e, 2)) if commands is None else commands
         return self._run(Inputs(actions, commands, np.full(e, DECIDE, np.int8)))
 
@@ -329,14 +331,14 @@ class Engine:
             np.zeros(e, STEP),
         )
         rules = (self.settings, self.mode, self.penalty, self.autoreset)
-        common = (self.world, self.batch, inputs, outputs, self.film, *rules)
+        common = (self.world, self.batch, inputs, outputs, self.film, self._watch, *rules)
         if not run.signatures:
-            _warm_up(common)
+            _warm_up(self._sights[0], *common)
         if self._pool is None:
-            run(0, e, *common)
+            run(0, e, self._sights[0], *common)
         else:
-            ranges = zip(self._shares[:-1], self._shares[1:], strict=True)
-            for done in [self._pool.submit(run, first, last, *common) for first, last in ranges]:
+            shares = zip(self._shares[:-1], self._shares[1:], self._sights, strict=True)
+            for done in [self._pool.submit(run, *share, *common) for share in shares]:
                 done.result()
         if self.batch.episodes["overflow"].any():
             self.batch.episodes["overflow"] = False
@@ -353,11 +355,12 @@ class Engine:
             self._pool.shutdown()
 
 
-def _warm_up(arguments) -> None:
+def _warm_up(*arguments) -> None:
     """Compile the kernel, or load it from numba's cache; says so if that takes long."""
     notice = Timer(
         _PATIENCE, lambda: print("compiling the fast engine; numba keeps the result for later runs", file=sys.stderr)
     )
     notice.start()
-    run(0, 0, *arguments)
+    with compiling_quickly():
+        run(0, 0, *arguments)
     notice.cancel()

@@ -7,10 +7,9 @@ decision and writes the command back.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from envs.fast.collisions import is_near, overlap
-from envs.fast.compiled import compiled, merged
+from envs.fast.compiled import compiled, unfolded
 from envs.fast.floats import norm
 from envs.fast.network import heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, OBSTACLE, OBSTACLE_SIZE
@@ -64,7 +63,6 @@ def no_frames() -> Frames:
     return Frames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), np.zeros((0, 0), bool))
 
 
-@njit
 def make_watch(heading_bound):
     """Tables for a `heading_bound` as in `Rules`."""
     boxes = np.zeros((2, 4))
@@ -100,7 +98,7 @@ def start_tally(step):
     step.partner, step.response = -1, 0
 
 
-@merged
+@unfolded
 def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step):
     """Restrict the ego's command on one frame, unless it has had its contact.
 

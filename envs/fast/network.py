@@ -19,11 +19,11 @@ STRAIGHT, SINE, CIRCULAR = range(3)
 
 LANE = np.dtype(
     [
-        ("kind", "i4"),  # STRAIGHT, SINE or CIRCULAR
-        ("road", "i4"),  # index of the road it belongs to
-        ("id", "i4"),  # index within that road, counted to the right
-        ("siblings", "i4"),  # lanes of that road, itself included
-        ("priority", "i4"),
+        ("kind", "i8"),  # STRAIGHT, SINE or CIRCULAR
+        ("road", "i8"),  # index of the road it belongs to
+        ("id", "i8"),  # index within that road, counted to the right
+        ("siblings", "i8"),  # lanes of that road, itself included
+        ("priority", "i8"),
         ("forbidden", "?"),  # nobody changes to it
         ("exits", "?"),  # leads out of an intersection
         ("x", "f8"),  # start, or centre of the circle [m]
@@ -48,10 +48,10 @@ LANE = np.dtype(
 
 ROAD = np.dtype(
     [
-        ("first", "i4"),  # its leftmost lane
-        ("lanes", "i4"),
-        ("origin", "i4"),  # node where it starts
-        ("end", "i4"),  # node where it ends
+        ("first", "i8"),  # its leftmost lane
+        ("lanes", "i8"),
+        ("origin", "i8"),  # node where it starts
+        ("end", "i8"),  # node where it ends
     ],
     align=True,
 )
@@ -102,7 +102,7 @@ def compile_network(network, connected: bool, destinations: tuple[str, ...] = ()
     links, offsets = zip(*(_links(network, index, number, connected) for index in indices), strict=True)
     route_roads: list[list[int]] = []
     route_lanes: list[list[int]] = []
-    plans = np.zeros((len(indices), len(destinations)), np.int32)
+    plans = np.zeros((len(indices), len(destinations)), np.int64)
     for i, index in enumerate(indices):
         for d, destination in enumerate(destinations):
             plans[i, d] = len(route_roads)
@@ -112,12 +112,12 @@ def compile_network(network, connected: bool, destinations: tuple[str, ...] = ()
     return Network(
         lanes,
         roads,
-        _padded(next_roads, np.int32, -1),
-        _padded(links, np.int32, -1, 1 if lined_up else 2),
+        _padded(next_roads, np.int64, -1),
+        _padded(links, np.int64, -1, 1 if lined_up else 2),
         _padded(offsets, np.float64, 0.0, 1 if lined_up else 2),
         np.array([sum(1 << link for link in set(row)) if len(indices) < 63 else -1 for row in links], np.int64),
-        _padded(route_roads, np.int32, -1),
-        _padded(route_lanes, np.int32, -1),
+        _padded(route_roads, np.int64, -1),
+        _padded(route_lanes, np.int64, -1),
         plans,
     )
 

@@ -106,7 +106,7 @@ def _predict_steering(car, ghost, future, config):
     ghost[0] = car
     ghost[0].acceleration = 0.0
     for t in range(MOMENTS):
-        move(ghost, 1, _STEP, config.max_speed, config.min_speed)
+        move(ghost, len(ghost), _STEP, config.max_speed, config.min_speed)
         future[t, 0], future[t, 1], future[t, 2] = ghost[0].x, ghost[0].y, ghost[0].heading
 
 

@@ -1,5 +1,7 @@
 """Rewards and the ends of episodes."""
 
+import numpy as np
+
 from envs.fast.compiled import compiled
 from envs.fast.config import EXIT, HIGHWAY, INTERSECTION, MERGE, TWO_WAY
 from envs.fast.floats import clip, lmap
@@ -7,6 +9,9 @@ from envs.fast.network import is_on_lane
 from envs.fast.state import DIRECT
 
 _EXIT_DISTANCE = 25.0  # beyond an intersection [m]
+
+
+NO_ACTION = np.int64(-1)
 
 
 @compiled
@@ -30,7 +35,7 @@ def rate(cars, episode, action, lanes, sight, config, step):
     Args:
       cars: `[N]` CAR.
       episode: EPISODE.
-      action: of the agent; -1 = continuous, or none yet.
+      action: of the agent; NO_ACTION = continuous, or none yet.
       lanes: `[L]` LANE.
       sight: this frame's.
       config: CONFIG.

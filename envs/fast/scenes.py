@@ -41,7 +41,7 @@ def make_scene(cars, episode, order, net, lanes, config, target_speeds, lane_odd
 
 
 @compiled
-def add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config):
+def add_vehicle(cars, episode, x, y, heading, speed, lanes, config):
     """Put a new vehicle on the road; returns its index."""
     i = episode.cars
     car = cars[i]
@@ -53,7 +53,7 @@ def add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config):
     car.delta = config.delta
     car.impact_x = car.impact_y = 0.0
     car.length, car.width = CAR_LENGTH, CAR_WIDTH
-    car.kind = kind
+    car.kind = TRAFFIC
     car.lane = car.target_lane = closest_lane(lanes, x, y, heading)
     car.speed_index, car.route, car.route_step = 0, -1, 0
     car.crashed = car.hit = False
@@ -67,8 +67,8 @@ def add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config):
 @compiled
 def add_ego(cars, episode, x, y, heading, speed, lanes, config, target_speeds):
     """Put the controlled vehicle on the road; returns its index."""
-    kind = META if config.meta_actions else DIRECT
-    i = add_vehicle(cars, episode, x, y, heading, speed, kind, lanes, config)
+    i = add_vehicle(cars, episode, x, y, heading, speed, lanes, config)
+    cars[i].kind = META if config.meta_actions else DIRECT
     if config.meta_actions:
         cars[i].speed_index = speed_to_index(speed, target_speeds)
         cars[i].target_speed = target_speeds[cars[i].speed_index]
@@ -105,7 +105,7 @@ def _highway(cars, episode, lanes, config, target_speeds):
 def add_on_lane(cars, episode, lane, s, speed, lanes, config):
     """Put a car of the traffic on a lane, along it; returns its index."""
     x, y = position(lane, s, 0.0)
-    return add_vehicle(cars, episode, x, y, heading_at(lane, s), speed, TRAFFIC, lanes, config)
+    return add_vehicle(cars, episode, x, y, heading_at(lane, s), speed, lanes, config)
 
 
 @compiled
@@ -116,11 +116,12 @@ def _merge(cars, episode, lanes, config, target_speeds):
         lane = lanes[config.main_lane + integers(episode, 2)]
         x, y = position(lane, s + uniform(episode, -5.0, 5.0), 0.0)
         speed += uniform(episode, -1.0, 1.0)
-        add_vehicle(cars, episode, x, y, 0.0, speed, TRAFFIC, lanes, config)
+        add_vehicle(cars, episode, x, y, 0.0, speed, lanes, config)
     x, y = position(lanes[config.side_lane], 110.0, 0.0)
-    i = add_vehicle(cars, episode, x, y, 0.0, 20.0, TRAFFIC, lanes, config)
+    i = add_vehicle(cars, episode, x, y, 0.0, 20.0, lanes, config)
     cars[i].target_speed = 30.0
-    i = add_vehicle(cars, episode, config.obstacle_x, config.obstacle_y, 0.0, 0.0, OBSTACLE, lanes, config)
+    i = add_vehicle(cars, episode, config.obstacle_x, config.obstacle_y, 0.0, 0.0, lanes, config)
+    cars[i].kind = OBSTACLE
     cars[i].length = cars[i].width = OBSTACLE_SIZE
     episode.vehicles -= 1
 

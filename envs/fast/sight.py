@@ -10,7 +10,6 @@ out what nobody will ask for, and neighbours are searched among all cars.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import wrap_to_pi
@@ -38,19 +37,18 @@ class Sight(NamedTuple):
     ghost: np.ndarray  # `[1]` CAR, a copy to predict with
 
 
-@njit
 def make_sight(n_lanes, n, speeds, lanes, times):
     """Fresh working memory."""
     return Sight(
         np.empty((n_lanes, n)),
         np.empty((n_lanes, n)),
-        np.empty((n_lanes, n), np.int32),
-        np.empty(n_lanes, np.int32),
-        np.empty((n_lanes, n), np.int32),
-        np.empty(n, np.int32),
-        np.empty(max(n * (n - 1) // 2, 1), np.int32),
+        np.empty((n_lanes, n), np.int64),
+        np.empty(n_lanes, np.int64),
+        np.empty((n_lanes, n), np.int64),
+        np.empty(n, np.int64),
+        np.empty(max(n * (n - 1) // 2, 1), np.int64),
         np.empty((2, 4, 2)),
-        np.empty(n, np.int32),
+        np.empty(n, np.int64),
         np.empty((speeds, lanes, times)),
         np.full(n, -1, np.int64),
         np.empty((n, MOMENTS + 2, 3)),

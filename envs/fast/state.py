@@ -34,12 +34,12 @@ CAR = np.dtype(
         ("impact_y", "f8"),
         ("length", "f8"),  # [m]
         ("width", "f8"),
-        ("kind", "i4"),
-        ("lane", "i4"),  # lane it is on
-        ("target_lane", "i4"),  # lane it heads for
-        ("speed_index", "i4"),  # among the target speeds, of a META car
-        ("route", "i4"),  # row of the route tables, -1 = none
-        ("route_step", "i4"),  # steps of the route that lie behind
+        ("kind", "i8"),
+        ("lane", "i8"),  # lane it is on
+        ("target_lane", "i8"),  # lane it heads for
+        ("speed_index", "i8"),  # among the target speeds, of a META car
+        ("route", "i8"),  # row of the route tables, -1 = none
+        ("route_step", "i8"),  # steps of the route that lie behind
         ("crashed", "?"),
         ("hit", "?"),  # an impact is due
         ("checks", "?"),  # looks for collisions itself
@@ -53,32 +53,32 @@ EPISODE = np.dtype(
     [
         *GENERATOR,
         ("time", "f8"),  # [s]
-        ("steps", "i4"),  # decisions since reset
-        ("cars", "i4"),  # road users present, obstacles included
-        ("vehicles", "i4"),  # of these, vehicles; they come first
-        ("ego", "i4"),  # index of the controlled vehicle
+        ("steps", "i8"),  # decisions since reset
+        ("cars", "i8"),  # road users present, obstacles included
+        ("vehicles", "i8"),  # of these, vehicles; they come first
+        ("ego", "i8"),  # index of the controlled vehicle
         ("ended", "?"),  # the last step ended the episode
-        ("observed_lanes", "i4"),  # lanes of the road at reset, which scale the observed y
+        ("observed_lanes", "i8"),  # lanes of the road at reset, which scale the observed y
         ("return_", "f8"),  # rewards since reset
-        ("road_frames", "i4"),  # since the road was made, on roads that are regulated
+        ("road_frames", "i8"),  # since the road was made, on roads that are regulated
         ("overflow", "?"),  # a car found no room in the arrays
         # the shield on the ego
-        ("frame_lane", "i4"),  # lane it measures along, -1 = none yet
-        ("turn", "i4"),  # which of the two last frames is the last
+        ("frame_lane", "i8"),  # lane it measures along, -1 = none yet
+        ("turn", "i8"),  # which of the two last frames is the last
         ("nominal_acceleration", "f8"),  # last command given from outside
         ("nominal_steering", "f8"),
-        ("frames", "i4"),  # watched since reset
-        ("frames_overridden", "i4"),
-        ("dangerous_pairs", "i4"),
-        ("broken_duties", "i4"),
+        ("frames", "i8"),  # watched since reset
+        ("frames_overridden", "i8"),
+        ("dangerous_pairs", "i8"),
+        ("broken_duties", "i8"),
         ("cost", "f8"),
         ("min_ttc", "f8"),  # [s]
-        ("blame", "i4"),  # 0 before a contact, then 1 + index into `shield.blame.VERDICTS`
-        ("blame_partner", "i4"),
-        ("blame_axes", "i4"),
-        ("blame_frames", "i4"),  # from the danger threshold to the contact
-        ("ego_duty", "i4"),
-        ("other_duty", "i4"),
+        ("blame", "i8"),  # 0 before a contact, then 1 + index into `shield.blame.VERDICTS`
+        ("blame_partner", "i8"),
+        ("blame_axes", "i8"),
+        ("blame_frames", "i8"),  # from the danger threshold to the contact
+        ("ego_duty", "i8"),
+        ("other_duty", "i8"),
         ("ego_excess", "f8"),
         ("other_excess", "f8"),
     ],
@@ -95,33 +95,33 @@ STEP = np.dtype(
         *[(f"reward_{k}", "f8") for k in range(REWARDS)],
         ("raw_reward", "f8"),
         # what the shield saw and did
-        ("frames", "i4"),
-        ("overridden", "i4"),
-        ("limited", "i4"),
-        ("dangerous_pairs", "i4"),
-        ("broken_duties", "i4"),
+        ("frames", "i8"),
+        ("overridden", "i8"),
+        ("limited", "i8"),
+        ("dangerous_pairs", "i8"),
+        ("broken_duties", "i8"),
         ("acceleration_change", "f8"),
         ("steering_change", "f8"),
         ("margin_lon", "f8"),
         ("margin_lat", "f8"),
-        ("partner", "i4"),
-        ("response", "i4"),
+        ("partner", "i8"),
+        ("response", "i8"),
         ("cost", "f8"),
         ("override_share", "f8"),
         ("episode_cost", "f8"),
-        ("episode_dangerous_pairs", "i4"),
-        ("episode_broken_duties", "i4"),
+        ("episode_dangerous_pairs", "i8"),
+        ("episode_broken_duties", "i8"),
         ("min_ttc", "f8"),
-        ("blame", "i4"),
-        ("blame_partner", "i4"),
-        ("blame_axes", "i4"),
-        ("blame_frames", "i4"),
-        ("ego_duty", "i4"),
-        ("other_duty", "i4"),
+        ("blame", "i8"),
+        ("blame_partner", "i8"),
+        ("blame_axes", "i8"),
+        ("blame_frames", "i8"),
+        ("ego_duty", "i8"),
+        ("other_duty", "i8"),
         ("ego_excess", "f8"),
         ("other_excess", "f8"),
         ("episode_return", "f8"),
-        ("episode_length", "i4"),
+        ("episode_length", "i8"),
     ],
     align=True,
 )

@@ -1,5 +1,7 @@
 """Traffic that comes and goes at an intersection, with the random numbers drawn in highway-env's order."""
 
+import numpy as np
+
 from envs.fast.compiled import compiled
 from envs.fast.draws import integers, normal, random, two_of, uniform
 from envs.fast.floats import norm
@@ -10,6 +12,7 @@ from envs.fast.sight import sort_along_x
 
 _CLEARANCE = 15.0  # of a new car to all others [m]
 _EGO_CLEARANCE = 20.0  # others are removed within it [m]
+_ANYWHERE, _STRAIGHT_ON = np.int64(0), np.int64(1)  # where cars are bound for
 _LEAVING = 20.0  # cars vanish that far before the end of the world [m]
 
 
@@ -32,13 +35,13 @@ def open_intersection(cars, episode, order, net, sight, config, target_speeds):
         cars[i].length = 0.0
     n = config.traffic
     for t in range(n - 1):
-        _arrive(cars, episode, t * (80.0 / (n - 1)), 1.0, 1.0, 0.6, False, net, config)
+        _arrive(cars, episode, t * (80.0 / (n - 1)), 1.0, 1.0, 0.6, _ANYWHERE, net, config)
     _renumber(cars, episode, order)
     survey(cars, episode, lanes, sight, config)
     for _ in range(config.warm_up_frames):
         think(cars, episode, order, net, sight, config)
         act(cars, episode, order, net, sight, config)
-    _arrive(cars, episode, 60.0, 0.1, 0.0, 1.0, True, net, config)
+    _arrive(cars, episode, 60.0, 0.1, 0.0, 1.0, _STRAIGHT_ON, net, config)
     _add_ego_on_its_way(cars, episode, net, config, target_speeds)
     _renumber(cars, episode, order)
     episode.observed_lanes = lanes[cars[episode.ego].lane].siblings
@@ -54,7 +57,7 @@ def let_traffic_flow(cars, episode, order, net, config):
             _remove(cars, episode, i)
         else:
             i += 1
-    _arrive(cars, episode, 0.0, 1.0, 1.0, config.spawn_probability, False, net, config)
+    _arrive(cars, episode, 0.0, 1.0, 1.0, config.spawn_probability, _ANYWHERE, net, config)
     _renumber(cars, episode, order)
 
 
@@ -65,12 +68,12 @@ def _arc_length(lane, car):
 
 
 @compiled
-def _arrive(cars, episode, s, deviation, speed_deviation, probability, straight, net, config):
+def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, net, config):
     """Perhaps put a new car on one of the entries, around arc length `s` [m], bound for another arm."""
     if random(episode) > probability:
         return
     origin, destination = two_of(episode, 4)
-    if straight:
+    if bound == _STRAIGHT_ON:
         destination = (origin + 2) % 4
     lane = net.lanes[config.main_lane + origin * config.arm]
     s = s + 5.0 + normal(episode) * deviation

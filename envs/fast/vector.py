@@ -145,7 +145,7 @@ class FastVectorEnv(VectorEnv):
         if len(actions) != self.num_envs:
             raise ValueError(f"{len(actions)} actions given; expected {self.num_envs}")
         if len(self.scenario.labels):
-            return actions.astype(np.int32), None
+            return actions.astype(np.int64), None
         return None, self.scenario.commands(actions)
 
     def _shaped(self, observations: np.ndarray) -> np.ndarray:
