@@ -22,6 +22,8 @@ class Comparison(NamedTuple):
     """Largest differences found over some episodes."""
 
     episodes: int
+    equal: int  # episodes without any difference
+    close: int  # episodes without a discrete difference, and none beyond 1e-8 or one unit of float32
     decisions: int
     state: float  # positions [m], headings [rad], speeds [m/s], timers [s]
     reward: float
@@ -66,11 +68,12 @@ def _compare(env_id, seeds, policy, config, shield, max_steps, until) -> Compari
     stock = envs.make(env_id, shield=shield, config=config)
     settings = stock.settings if shield else None
     engine = Engine(compile_scenario(env_id, config), 1, settings, autoreset=DISABLED)
-    worst = {"state": 0.0, "reward": 0.0, "ulps": 0}
+    largest = {"state": 0.0, "reward": 0.0, "ulps": 0}
     discrete: list[str] = []
-    decisions = episodes = 0
+    decisions = episodes = equal = close = 0
     for seed in seeds:
         rng = np.random.default_rng([seed, 99])
+        worst = dict.fromkeys(largest, 0)
         before = len(discrete)
         seen, _ = stock.reset(seed=seed)
         engine.seed([seed])
@@ -94,17 +97,21 @@ def _compare(env_id, seeds, policy, config, shield, max_steps, until) -> Compari
             if terminated or truncated or len(discrete) > before:
                 break
         episodes += 1
+        same = len(discrete) == before
+        equal += same and not any(worst.values())
+        close += same and max(worst["state"], worst["reward"]) <= 1e-8 and worst["ulps"] <= 1
+        largest = {name: max(largest[name], worst[name]) for name in largest}
         if until and until(decisions):
             break
     stock.close()
-    return Comparison(episodes, decisions, worst["state"], worst["reward"], worst["ulps"], discrete)
+    return Comparison(episodes, equal, close, decisions, *largest.values(), discrete)
 
 
 def engine_inputs(engine, action):
     """What one action of the stock environment is for an engine of one environment."""
     scenario = engine.scenario
     if len(scenario.labels):
-        return np.array([action], np.int32), None
+        return np.array([action]), None
     return None, scenario.commands(np.asarray(action)[None])
 
 
