@@ -1,8 +1,10 @@
-"""The claim, tested on the original simulator: whatever the policy, the ego is never to blame.
+"""The claim, tested: whatever the policy, the ego is never to blame.
 
-    python bench/evidence.py                     every case, results in runs/evidence/
+    python bench/evidence.py                     every case on the original simulator, results in runs/evidence/
     python bench/evidence.py --cases fast-random fast-faster --episodes 50
     python bench/evidence.py --modes monitor     the same policies without the shield
+    python bench/evidence.py --backend fast --cases fast-random fast-faster fast-continuous --episodes 100000
+                                                 in the compiled engine
 
 Each case plays scripted policies on seeds 0, 1, ... and prints one row: contacts by verdict, the
 upper end of the 95 % interval for "ego at fault", the audit of every dangerous pair-frame, return
@@ -14,23 +16,25 @@ import multiprocessing
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 import tyro
+from gymnasium.vector import AutoresetMode
 from rich.console import Console
 from rich.table import Table
 
-from envs import make
+from envs import make, make_vec
 from envs.traffic import RECKLESS
 from eval.files import atomic
 from eval.progress import progress_bar
-from eval.rollout import run_episode
+from eval.rollout import evaluate, run_episode
 from eval.stats import bootstrap_mean, wilson
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
+SIDE_BY_SIDE = 1024  # environments in the engine
 
 
 class Case(NamedTuple):
@@ -60,6 +64,20 @@ def act(policy: str, rng: np.random.Generator) -> Any:
         case "full-throttle":
             return np.array([1.0, rng.uniform(-1.0, 1.0)])
     raise ValueError(f"policy = {policy!r} is unknown")
+
+
+def act_batch(policy: str, rng: np.random.Generator, n: int) -> Any:
+    """The next actions of a scripted policy in n environments."""
+    match policy:
+        case "random":
+            return rng.integers(5, size=n)
+        case "lanes":
+            return np.where(rng.random(n) < 0.5, LANE_LEFT, LANE_RIGHT)
+        case "continuous":
+            return rng.uniform(-1.0, 1.0, (n, 2)).astype(np.float32)
+        case "full-throttle":
+            return np.column_stack([np.ones(n), rng.uniform(-1.0, 1.0, n)]).astype(np.float32)
+    return np.full(n, act(policy, rng))
 
 
 def _cases() -> dict[str, Case]:
@@ -93,7 +111,8 @@ class Config:
     cases: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = tuple(CASES)  # which cases to play
     episodes: int = 0  # episodes per case; 0: as many as the case asks for
     modes: tuple[str, ...] = ("override",)  # "override" and/or "monitor"
-    n_workers: int = 2  # processes
+    backend: Literal["highway-env", "fast"] = "highway-env"  # the original simulator or the compiled engine
+    n_workers: int = 2  # processes, or threads of the engine
     out: Path = Path("runs/evidence")  # one CSV per case and mode
 
 
@@ -110,21 +129,46 @@ def play(name: str, mode: str, seed: int) -> dict[str, Any]:
 def played(name: str, mode: str, config: Config) -> pd.DataFrame:
     """All episodes of one case, from its file if that is there already."""
     count = config.episodes or CASES[name].episodes
-    path = config.out / f"{name}-{mode}.csv"
+    path = config.out / (f"{name}-{mode}.csv" if config.backend == "highway-env" else f"{name}-{mode}-{count}.csv")
     if path.exists():
         frame = pd.read_csv(path, keep_default_na=False)
         if len(frame) == count:
             return frame
+    frame = in_engine(name, mode, count, config) if config.backend == "fast" else on_original(name, mode, count, config)
+    with atomic(path) as temporary:
+        frame.to_csv(temporary, index=False)
+    return frame
+
+
+def on_original(name: str, mode: str, count: int, config: Config) -> pd.DataFrame:
+    """Episodes of one case, one at a time in each of several processes."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(config.n_workers, context) as pool, progress_bar(count, name, "episode") as bar:
         rows = []
         for row in pool.map(play, [name] * count, [mode] * count, range(count)):
             rows.append(row)
             bar.update()
-    frame = pd.DataFrame(rows)
-    with atomic(path) as temporary:
-        frame.to_csv(temporary, index=False)
-    return frame
+    return pd.DataFrame(rows)
+
+
+def in_engine(name: str, mode: str, count: int, config: Config) -> pd.DataFrame:
+    """Episodes of one case, a thousand side by side. Random actions come from one generator for all."""
+    case, rng = CASES[name], np.random.default_rng(0)
+
+    def make_batch(n: int) -> Any:
+        options = {"config": dict(case.config), "threads": config.n_workers}
+        return make_vec(case.env_id, n, mode, autoreset_mode=AutoresetMode.DISABLED, **options)
+
+    with progress_bar(count, name, "episode") as bar:
+        frame = evaluate(
+            make_batch,
+            lambda observations: act_batch(case.policy, rng, len(observations)),
+            range(count),
+            n_envs=SIDE_BY_SIDE,
+            keep_actions=False,
+            progress=lambda done: bar.update(done - bar.n),
+        )
+    return frame.drop(columns="actions").assign(case=name, mode=mode)
 
 
 def row(frame: pd.DataFrame) -> list[str]:
@@ -140,7 +184,7 @@ def row(frame: pd.DataFrame) -> list[str]:
         str(frame["mode"].iloc[0]),
         str(n),
         str(int(frame["crashed"].sum())),
-        f"{at_fault} (< {100 * wilson(at_fault, n).high:.1f} %)",
+        f"{at_fault} (< {100 * wilson(at_fault, n).high:.2g} %)",
         str(count["other"]),
         str(count["inherited"]),
         str(count["none"]),

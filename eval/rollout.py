@@ -18,6 +18,7 @@ def evaluate(
     seeds: Sequence[int],
     *,
     n_envs: int = 1,
+    keep_actions: bool = True,
     progress: Callable[[int], None] = lambda episodes: None,
 ) -> pd.DataFrame:
     """Play exactly one episode per seed, several side by side.
@@ -31,6 +32,7 @@ def evaluate(
       policy: observations `[E, ...]` -> actions `[E]`.
       seeds: one per episode.
       n_envs: E.
+      keep_actions: fill the column "actions"; they must be whole numbers.
       progress: called with the episodes done so far.
 
     Returns:
@@ -41,7 +43,7 @@ def evaluate(
     env = make_vec(envs)
     records: dict[int, dict[str, Any]] = {}  # by index into seeds
     playing, upcoming = list(range(envs)), itertools.count(envs)  # indices into seeds; beyond: nothing is left
-    returns, speeds = np.zeros(envs), np.zeros(envs)
+    returns, speeds, lengths = np.zeros(envs), np.zeros(envs), np.zeros(envs, int)
     actions: list[list[int]] = [[] for _ in range(envs)]
     try:
         observations, _ = env.reset(seed=[int(seed) for seed in seeds[:envs]])
@@ -50,17 +52,18 @@ def evaluate(
             observations, rewards, terminated, truncated, infos = env.step(chosen)
             returns += rewards
             speeds += infos["speed"]
-            for e in range(envs):
+            lengths += 1
+            for e in range(envs if keep_actions else 0):
                 actions[e].append(int(chosen[e]))
             ended = terminated | truncated
             if not ended.any():
                 continue
             for e in np.flatnonzero(ended).tolist():
                 if playing[e] < len(seeds):
-                    record = _record(seeds[playing[e]], returns[e], speeds[e], len(actions[e]), _info(infos, e))
+                    record = _record(seeds[playing[e]], returns[e], speeds[e], int(lengths[e]), _info(infos, e))
                     records[playing[e]] = record | {"actions": " ".join(map(str, actions[e]))}
                 playing[e] = next(upcoming)
-                returns[e], speeds[e], actions[e] = 0.0, 0.0, []
+                returns[e], speeds[e], lengths[e], actions[e] = 0.0, 0.0, 0, []
             progress(len(records))
             next_seeds = [int(seeds[i % len(seeds)]) if end else None for i, end in zip(playing, ended, strict=True)]
             observations, _ = env.reset(seed=next_seeds, options={"reset_mask": ended})

@@ -78,7 +78,7 @@ def test_rows_of_cars_that_left_are_empty():
     engine.seed(range(8))
     engine.reset()
     for _ in range(13):
-        engine.step(np.zeros(8, np.int32))
+        engine.step(np.zeros(8, int))
         lengths = engine.batch.cars["length"]
         assert ((lengths > 0).sum(axis=1) == engine.batch.episodes["cars"]).all()
 
@@ -87,7 +87,7 @@ def test_a_masked_reset_returns_the_last_observation_of_the_others():
     engine = Engine(compile_scenario(ENV), 4, autoreset=DISABLED)
     engine.seed(range(4))
     engine.reset()
-    before = engine.step(np.full(4, 1, np.int32)).observations
+    before = engine.step(np.full(4, 1)).observations
     after = engine.reset(np.array([True, False, False, False])).observations
     assert np.array_equal(after[1:], before[1:])
     assert not np.array_equal(after[0], before[0])
