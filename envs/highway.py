@@ -330,9 +330,7 @@ class ShieldedEgo:
         rules = (settings.ego, settings.other, settings.rules, settings.dt)
         for i in touching:
             catch_up(self.memory[i], self.last[0], self.last[1][i], *rules)
-        verdicts = [
-            judge_contact(ego, users[i], self.memory[i], *rules) for i in touching
-        ]
+        verdicts = [judge_contact(ego, users[i], self.memory[i], *rules) for i in touching]
         # several at once: the one that weighs most against the ego counts
         weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
         i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: weight[VERDICTS[pair[1].verdict]])

@@ -9,7 +9,7 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 from envs.fast.config import compile_scenario
 from envs.fast.vector import FastVectorEnv
 from envs.scenarios import make
-from envs.wrapper import MODES, _check_environment, _check_params, _settings
+from envs.wrapper import MODES, check_environment, check_params, settings_for
 from shield.params import PRESETS, Preset, RSSParams, Rules
 
 BACKENDS = ("fast", "highway-env")
@@ -55,8 +55,8 @@ def make_vec(
     scenario = compile_scenario(env_id, config)
     settings = None
     if shield is not None:
-        _check_environment(scenario.stock)
-        settings = _settings(_check_params(params), rules, shield, 1 / scenario.stock.config["simulation_frequency"])
+        check_environment(scenario.stock)
+        settings = settings_for(check_params(params), rules, shield, 1 / scenario.stock.config["simulation_frequency"])
     return FastVectorEnv(scenario, num_envs, settings, intervention_penalty, autoreset_mode, threads)
 
 

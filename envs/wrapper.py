@@ -75,9 +75,9 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
             raise ValueError(f"mode = {mode!r}: expected one of {', '.join(MODES)}")
         if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
             raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
-        _check_environment(env.unwrapped)
+        check_environment(env.unwrapped)
         self.mode = mode
-        self.params = _check_params(params)
+        self.params = check_params(params)
         self.rules = rules
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
@@ -106,7 +106,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
 
     def reset(self, *, seed=None, options=None):
         observation, info = self.env.reset(seed=seed, options=options)
-        _check_environment(self.env.unwrapped)
+        check_environment(self.env.unwrapped)
         self._attach()
         info.update(self._info(StepTally(), cost=0.0))
         return observation, info
@@ -128,7 +128,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
 
     def _attach(self) -> None:
         env: Any = self.env.unwrapped
-        settings = _settings(self.params, self.rules, self.mode, 1 / env.config["simulation_frequency"])
+        settings = settings_for(self.params, self.rules, self.mode, 1 / env.config["simulation_frequency"])
         self._ego = ShieldedEgo(env.vehicle, settings, self.record)
 
     def _info(self, tally: StepTally, cost: float) -> dict:
@@ -160,7 +160,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         }
 
 
-def _check_environment(env: Any) -> None:
+def check_environment(env: Any) -> None:
     if not isinstance(env, (HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv)):
         raise ValueError(f"environment {type(env).__name__} is not supported; expected one of {SUPPORTED}")
     if len(env.controlled_vehicles) != 1:
@@ -175,7 +175,7 @@ def _check_environment(env: Any) -> None:
         raise ValueError("action option dynamical = True is not supported; expected False")
 
 
-def _check_params(params) -> Preset:
+def check_params(params) -> Preset:
     if isinstance(params, Preset):
         return params
     if isinstance(params, tuple) and len(params) == 2 and all(isinstance(p, RSSParams) for p in params):
@@ -183,7 +183,7 @@ def _check_params(params) -> Preset:
     raise ValueError(f"params = {params!r}: expected a Preset or a pair of RSSParams (ego, other)")
 
 
-def _settings(params: Preset, rules: Rules, mode: str, dt: float) -> Settings:
+def settings_for(params: Preset, rules: Rules, mode: str, dt: float) -> Settings:
     """The table for frames of `dt` seconds: response times rounded up to whole frames (condition C2)."""
     RSSParams.validated(**params.ego._asdict())
     RSSParams.validated(**params.other._asdict())

@@ -9,6 +9,8 @@ import numpy as np
 from numba import njit, types
 from numba.extending import overload
 
+_njit: Any = njit  # its published types lack some options
+
 
 def fingerprint(*more: Path) -> str:
     """A text that changes with every source file of this package, and with the files named."""
@@ -28,17 +30,17 @@ def compiled(function: Callable[..., Any]) -> Any:
     elsewhere it would go on with the old code. A shield must never do that, so any change in the
     package compiles everything anew.
     """
-    return _stamped(njit(cache=True, error_model="numpy", _nrt=False)(function))
+    return _stamped(_njit(cache=True, error_model="numpy", _nrt=False)(function))
 
 
 def merged(function: Callable[..., Any]) -> Any:
     """`compiled`, and merged into its callers: handing over tables by value would cost more than the work."""
-    return _stamped(njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)(function))
+    return _stamped(_njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)(function))
 
 
 def compiled_for_arrays(function: Callable[..., Any]) -> Any:
     """`compiled` for what also takes whole arrays, or makes them."""
-    return _stamped(njit(cache=True, error_model="numpy")(function))
+    return _stamped(_njit(cache=True, error_model="numpy")(function))
 
 
 def _stamped(dispatcher: Any) -> Any:

@@ -9,6 +9,7 @@ from shield.compiled import compiled_for_arrays
 
 _TINY = 1e-300  # stands in for a positive divisor where the dividend is 0
 
+
 @compiled_for_arrays
 def speed_after_response(v, rho, a, v_cap):
     """Speed after accelerating at `a` for `rho`, never beyond `v_cap` [m/s]. A faster car keeps its speed."""

@@ -3,23 +3,27 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from numba import config, njit
+import numba
 
 from shield.compiled import fingerprint
+
+_njit: Any = numba.njit  # its published types lack some options
+_config: Any = numba.config
 
 # Inner functions allocate nothing, so numba need not count references to the arrays they are handed.
 # Counting would cost far more than what they compute. They are compiled into the kernel, which alone
 # is cached.
-compiled = njit(_nrt=False, error_model="numpy")
+compiled = _njit(_nrt=False, error_model="numpy")
 
 # Calls hand over tuples of arrays field by field. Where that would cost more than the work, the
 # function is merged into its caller.
-merged = njit(_nrt=False, error_model="numpy", forceinline=True)
+merged = _njit(_nrt=False, error_model="numpy", forceinline=True)
 
 # The same for what has one caller only: it becomes part of its source and is never compiled alone,
 # which saves compile time.
-unfolded = njit(_nrt=False, error_model="numpy", inline="always")
+unfolded = _njit(_nrt=False, error_model="numpy", inline="always")
 
 
 def kernel(function):
@@ -27,7 +31,7 @@ def kernel(function):
 
     As in `shield.compiled`, any change in what the kernel is made of compiles it anew.
     """
-    dispatcher = njit(cache=True, nogil=True)(function)
+    dispatcher = _njit(cache=True, nogil=True)(function)
     here = Path(__file__).parent
     dispatcher._cache._cache_file._source_stamp = fingerprint(*here.glob("*.py"), here.parent / "highway.py")
     return dispatcher
@@ -36,9 +40,9 @@ def kernel(function):
 @contextmanager
 def compiling_quickly() -> Iterator[None]:
     """Compile at LLVM's first level of optimisation: the kernel is ready sooner and runs as fast."""
-    level = config.OPT
-    config.OPT = type(level)(1)
+    level = _config.OPT
+    _config.OPT = type(level)(1)
     try:
         yield
     finally:
-        config.OPT = level
+        _config.OPT = level

@@ -5,7 +5,7 @@ default and every override means what it means there.
 """
 
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import highway_env  # noqa: F401  registers the environments
@@ -109,7 +109,7 @@ class Scenario(NamedTuple):
     capacity: int  # road users at most
     observation_space: spaces.Space
     action_space: spaces.Space
-    stock: gym.Env  # the stock environment, without wrappers
+    stock: Any  # the stock environment, without wrappers
 
     def commands(self, actions: np.ndarray) -> np.ndarray:
         """Acceleration [m/s^2] and steering [rad] of continuous actions `[E, A]`, as `[E, 2]` float64.
@@ -174,25 +174,26 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
     """
     if env_id not in SCENARIOS:
         raise Unsupported(f"env_id = {env_id!r}", f"one of {', '.join(SCENARIOS)}")
+    scenario = SCENARIOS[env_id]
+    asked = ((config or {}).get("action") or {}).get("type", "DiscreteMetaAction")
+    if scenario in (MERGE, TWO_WAY, ROUNDABOUT) and asked != "DiscreteMetaAction":
+        raise Unsupported(f"action type {asked} in {env_id}", "DiscreteMetaAction")  # nor does highway-env
     with _drivers_unchanged():
         wrapped = gym.make(env_id, config=config)
-    env = wrapped.unwrapped
+    env: Any = wrapped.unwrapped
     given = env.config
     _check(given)
     record = np.zeros(1, CONFIG)
-    scenario = SCENARIOS[env_id]
     record["scenario"] = scenario
     record["end_x"], record["exit_lane"] = np.inf, -1
     record["dt"] = 1 / given["simulation_frequency"]
     record["frames"] = int(given["simulation_frequency"] // given["policy_frequency"])
     record["period"] = 1 / given["policy_frequency"]
-    record["max_steps"] = wrapped.spec.max_episode_steps or 0
+    record["max_steps"] = (wrapped.spec and wrapped.spec.max_episode_steps) or 0
     record["duration"] = given.get("duration", np.inf)
     _fill_traffic(record)
     target_speeds, labels = _fill_action(record, env.action_type)
     features, ranges, connected = _fill_observation(record, env)
-    if scenario in (MERGE, TWO_WAY, ROUNDABOUT) and not record["meta_actions"]:
-        raise Unsupported(f"action type {type(env.action_type).__name__} in {env_id}", "DiscreteMetaAction")
     number = {index: i for i, index in enumerate(env.road.network.lanes_dict())}
     reward_names = _FILL_SCENE[scenario](record, given, env, number)
     network = compile_network(

@@ -39,8 +39,8 @@ from envs.fast.sight import make_sight, sort_along_x
 from envs.fast.state import CAR, EPISODE, STEP
 from envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from envs.highway import Settings
-from shield.params import PRESETS, Rules
 from shield.pair import ROAD_USER
+from shield.params import PRESETS, Rules
 from shield.response import MEMORY
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
@@ -207,9 +207,7 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
         if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
             _restart(cars, episode, order, past, world, sight, watch, mode, step, observation)
             continue
-        cost = _advance(
-            e, cars, episode, order, past, world, sight, watch, settings, mode, inputs, film, step
-        )
+        cost = _advance(e, cars, episode, order, past, world, sight, watch, settings, mode, inputs, film, step)
         _see(cars, episode, world, sight, observation)
         reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
         step.raw_reward = reward
@@ -279,7 +277,7 @@ class Engine:
         )
         self.film = Film(np.full(num_envs, -1, np.int64), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
         self._seen: np.ndarray | None = None  # last observations
-        self._size = int(np.prod(scenario.observation_space.shape))
+        self._size = int(np.prod(scenario.observation_space.shape or 1))
         self._shares = np.linspace(0, num_envs, threads + 1).astype(int)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         config = scenario.config[0]

@@ -4,14 +4,18 @@ numpy computes dot products of two-vectors with a fused multiply-add; plain arit
 in one of four.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
 from envs.fast.compiled import compiled
 
+_intrinsic: Any = intrinsic
 
-@intrinsic
+
+@_intrinsic
 def _fma(typing_context, a, b, c):
     """a * b + c, rounded once."""
     signature = types.float64(types.float64, types.float64, types.float64)

@@ -19,7 +19,6 @@ from shield.command import Command
 from shield.controller import Body, shield_frame
 from shield.geometry import PIECE_FIELDS, largest_half_extents
 from shield.lane_frame import same_frame, to_lane_frame
-from shield.pair import ROAD_USER
 from shield.response import MEMORY, catch_up, forget_safe
 
 OFF, MONITOR, OVERRIDE = range(3)

@@ -11,8 +11,8 @@ class Log(NamedTuple):
     """All frames of one episode."""
 
     env: int  # which environment of the batch
-    cars: np.ndarray  # `[T, N]` CAR at the start and after each frame, rows beyond `count` are empty
-    count: np.ndarray  # `[T]` road users present
+    cars: np.ndarray  # `[T, N]` CAR at the start and after each frame, rows beyond `present` are empty
+    present: np.ndarray  # `[T]` how many road users
     complete: bool  # False: the episode is still running
 
 

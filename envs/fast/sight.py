@@ -25,7 +25,7 @@ class Sight(NamedTuple):
     s: np.ndarray  # `[L, N]` arc length of each car on each lane [m]
     lateral: np.ndarray  # `[L, N]` signed offset [m]
     members: np.ndarray  # `[L, N]` cars on each lane, sorted by (arc length, index)
-    count: np.ndarray  # `[L]` how many
+    crowd: np.ndarray  # `[L]` how many
     rank: np.ndarray  # `[L, N]` place of a car among the members, -1 = not on the lane
     changing: np.ndarray  # `[N]` cars that head for another lane
     pairs: np.ndarray  # `[N (N - 1) / 2]` pairs that may collide
@@ -170,7 +170,7 @@ def line_up(n, lanes, order, sight):
                 sight.rank[k, i] = -1
         for b in range(count):
             sight.rank[k, members[b]] = b
-        sight.count[k] = count
+        sight.crowd[k] = count
 
 
 @merged
@@ -180,7 +180,7 @@ def _place(k, i, sight):
     if place >= 0:
         return place
     s, members = sight.s[k], sight.members[k]
-    low, high = 0, sight.count[k]
+    low, high = 0, sight.crowd[k]
     while low < high:
         middle = (low + high) // 2
         if s[members[middle]] < s[i]:
@@ -195,7 +195,7 @@ def car_ahead(k, i, n, net, lanes, sight):
     """Nearest car ahead of car `i` on lane `k`, -1 = none. Of several side by side the last one."""
     if net.links.shape[1] > 1:
         return _car_ahead_connected(k, i, n, net, lanes, sight)
-    s, members, count = sight.s[k], sight.members[k], sight.count[k]
+    s, members, count = sight.s[k], sight.members[k], sight.crowd[k]
     place = _place(k, i, sight)
     ahead = place + 1 if sight.rank[k, i] >= 0 else place
     if ahead < count:

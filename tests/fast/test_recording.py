@@ -27,7 +27,7 @@ def test_chosen_environments_are_recorded_frame_by_frame():
     log = env.recording.finished[0]
     assert log.env == 2 and log.complete
     assert (len(log.cars) - 1) % 5 == 0
-    assert (log.count == 21).all()
+    assert (log.present == 21).all()
     assert np.array_equal(log.cars[-6], before)
     assert log.cars["crashed"][-1].any()
     assert len(env.recording.running(2).cars) == 1
