@@ -1,6 +1,7 @@
 """Engine states in real highway-env environments and back: for rendering, and for checking."""
 
 import numpy as np
+from highway_env.road.lane import AbstractLane
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
@@ -79,17 +80,18 @@ def _route(car, indices, network: Network):
     return [(*indices[firsts[road]][:2], None if lane < 0 else int(lane)) for road, lane in left]
 
 
-def read(env, cars: np.ndarray, episode: np.ndarray, order: np.ndarray) -> None:
-    """Take over the state of a highway-env environment without routes into the engine.
+def read(env, cars: np.ndarray, episode: np.ndarray, order: np.ndarray, network: Network) -> None:
+    """Take over the state of a highway-env environment of the same configuration into the engine.
 
     Args:
       env: the unwrapped stock environment.
       cars: `[N]` CAR, overwritten.
       episode: EPISODE, changed.
       order: `[N]`, overwritten.
+      network: of the engine's scenario.
 
     Raises:
-      ValueError: a car follows a route, or there are more road users than room.
+      ValueError: a car follows a route that none plans here, or there are more road users than room.
     """
     road = env.road
     users = [*road.vehicles, *road.objects]
@@ -98,17 +100,21 @@ def read(env, cars: np.ndarray, episode: np.ndarray, order: np.ndarray) -> None:
     numbers = {index: i for i, index in enumerate(road.network.lanes_dict())}
     cars[:] = np.zeros(1, cars.dtype)
     for car, user in zip(cars, users, strict=False):
-        _read_user(car, user, numbers)
+        _read_user(car, user, numbers, network)
     order[:] = np.argsort([u.position[0] for u in users] + [np.inf] * (len(cars) - len(users)), kind="stable")
     episode["cars"], episode["vehicles"] = len(users), len(road.vehicles)
     episode["ego"], episode["ended"] = road.vehicles.index(env.vehicle), False
     episode["time"] = env.time
     frames = int(env.config["simulation_frequency"] // env.config["policy_frequency"])
     episode["steps"] = env.steps // frames
+    ranges = getattr(env.observation_type, "features_range", None) or {}
+    if "y" in ranges:
+        episode["observed_lanes"] = round(ranges["y"][1] / AbstractLane.DEFAULT_WIDTH)
+    episode["road_frames"] = getattr(road, "steps", 0)
     load_generator(episode, road.np_random.bit_generator)
 
 
-def _read_user(car, user, numbers) -> None:
+def _read_user(car, user, numbers, network: Network) -> None:
     car["x"], car["y"] = user.position
     car["heading"], car["speed"] = user.heading, user.speed
     car["cos"], car["sin"] = user.direction
@@ -124,11 +130,24 @@ def _read_user(car, user, numbers) -> None:
     if user.impact is not None:
         car["impact_x"], car["impact_y"] = user.impact
     if hasattr(user, "target_lane_index"):
-        if user.route:
-            raise ValueError("a car follows a route; expected cars without routes")
         car["kind"] = META
+        if user.route is not None:
+            car["route"], car["route_step"] = _find_route(user.route, numbers, network)
         car["target_lane"], car["target_speed"] = numbers[user.target_lane_index], user.target_speed
         car["speed_index"] = getattr(user, "speed_index", 0)
     if isinstance(user, IDMVehicle):
         car["kind"] = TRAFFIC
         car["timer"], car["delta"], car["changes_lane"] = user.timer, user.DELTA, user.enable_lane_change
+        car["yields"] = getattr(user, "is_yielding", False)
+
+
+def _find_route(route, numbers, network: Network) -> tuple[int, int]:
+    """Row of the route tables that ends like a route of highway-env, and how many of its steps lie behind."""
+    roads = [int(network.lanes["road"][numbers[origin, end, lane or 0]]) for origin, end, lane in route]
+    ids = [-1 if lane is None else lane for _, _, lane in route]
+    for row, (planned, planned_ids) in enumerate(zip(network.route_roads, network.route_lanes, strict=True)):
+        length = int((planned >= 0).sum())
+        behind = length - len(route)
+        if behind >= 0 and (*planned[behind:length],) == (*roads,) and (*planned_ids[behind:length],) == (*ids,):
+            return row, behind
+    raise ValueError(f"a car follows the route {route}; expected one that a car plans in this environment")

@@ -48,15 +48,16 @@ def test_a_loaded_state_goes_on_like_the_engine(env_id):
         assert reward == pytest.approx(rewards[0], abs=1e-8)
 
 
-def test_a_state_of_highway_env_goes_on_in_the_engine():
-    stock = gym.make(ENV).unwrapped
+@pytest.mark.parametrize("env_id", [ENV, "merge-v0", "exit-v0", "roundabout-v0", "intersection-v0"])
+def test_a_state_of_highway_env_goes_on_in_the_engine(env_id):
+    stock = gym.make(env_id).unwrapped
     stock.reset(seed=11)
     stock.step(1)
-    fast = envs.make_vec(ENV, 1, shield=None)
+    fast = envs.make_vec(env_id, 1, shield=None)
     fast.reset(seed=0)
     batch = fast.engine.batch
-    read(stock, batch.cars[0], batch.episodes[0], batch.order[0])
-    for action in (2, 3, 1):
+    read(stock, batch.cars[0], batch.episodes[0], batch.order[0], fast.scenario.network)
+    for action in (2, 0, 1):
         seen, reward, *_ = stock.step(action)
         observations, rewards, *_ = fast.step(np.array([action]))
         np.testing.assert_allclose(seen, observations[0], atol=1e-6)
