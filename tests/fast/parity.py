@@ -8,6 +8,7 @@ one unit in the last place; then every episode must be equal to the last bit.
 """
 
 import argparse
+import sys
 import warnings
 
 from lockstep import POLICIES, compare
@@ -29,27 +30,33 @@ SHIELDED = ("highway-fast-v0", "merge-v0", "merge-v1", "two-way-v0", "exit-v0", 
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--episodes", type=int, default=100, help="seeds per case")
     parser.add_argument("--envs", nargs="+", default=list(BARE))
     parser.add_argument("--policies", nargs="+", default=list(POLICIES), choices=POLICIES)
     parser.add_argument("--shield", nargs="+", default=["none"], choices=["none", "override", "monitor"])
     parser.add_argument("--continuous", action="store_true", help="steering and throttle instead of meta-actions")
+    parser.add_argument("--max-steps", type=int, default=1000, help="decisions of an episode")
+    parser.add_argument("--strict", action="store_true", help="fail unless all episodes are equal to the last bit")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
+    equal = True
     for env_id in arguments.envs:
         for mode in arguments.shield:
             if mode != "none" and env_id not in SHIELDED:
                 continue
             for policy in arguments.policies:
-                _row(env_id, mode, policy, arguments)
+                equal &= _row(env_id, mode, policy, arguments)
+    return 1 if arguments.strict and not equal else 0
 
 
-def _row(env_id: str, mode: str, policy: str, arguments) -> None:
+def _row(env_id: str, mode: str, policy: str, arguments) -> bool:
+    """Run and print one case. Is every episode equal to the last bit?"""
     shield = None if mode == "none" else mode
     config = CONTINUOUS if arguments.continuous else None
-    found = compare(env_id, range(arguments.episodes), policy, config=config, shield=shield)
+    seeds = range(arguments.episodes)
+    found = compare(env_id, seeds, policy, config=config, shield=shield, max_steps=arguments.max_steps)
     print(
         f"{env_id:16} {policy:7} shield {mode:8}: {found.episodes} episodes, {found.decisions} decisions, "
         f"{found.equal} equal to the last bit, {found.close} within 1e-8; "
@@ -58,7 +65,8 @@ def _row(env_id: str, mode: str, policy: str, arguments) -> None:
     )
     for difference in found.discrete[:5]:
         print(f"    {difference}", flush=True)
+    return found.equal == found.episodes
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
