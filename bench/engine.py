@@ -1,91 +1,131 @@
 """Speed of the compiled engine against highway-env, side by side in one run.
 
-    python bench/engine.py [--seconds 5] [--envs highway-fast-v0 highway-v0 ...]
+    python bench/engine.py                                highway-fast-v0, highway-v0, intersection-v0
+    python bench/engine.py --growth                       and growth with vehicles, environments, threads
 
-Random actions; observations, infos and autoreset included. Decisions are counted per second of CPU
-time of this process, so other load on the machine disturbs them little.
+Random actions; observations, infos and autoreset included; one thread, so figures are per core. All
+candidates take turns for several rounds, and medians over the rounds are compared: the speed of a
+shared machine changes within seconds.
 """
 
-import argparse
+import dataclasses
 import resource
+import sys
 import time
+from typing import Any
 
 import numpy as np
+import tyro
 
 import envs
 
 SIZES = (1, 64, 1024, 4096)
+VEHICLES = (20, 50, 100, 200, 400)
+ENVIRONMENTS = (64, 256, 1024, 4096, 16384)
 
 
-def decisions_per_cpu_second(env, seconds: float) -> float:
-    """Steps of all environments per second of CPU time, after a warm-up."""
-    rng = np.random.default_rng(0)
-    env.reset(seed=0)
-    n = env.num_envs
-    actions = rng.integers(env.single_action_space.n, size=(64, n))
-    env.step(actions[0])
-    start, steps = time.process_time(), 0
-    while time.process_time() - start < seconds:
-        env.step(actions[steps % 64])
-        steps += 1
-    return steps * n / (time.process_time() - start)
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """Measure decisions per second."""
+
+    envs: tuple[str, ...] = ("highway-fast-v0", "highway-v0", "intersection-v0")  # which environments
+    rounds: int = 5  # turns of every candidate
+    seconds: float = 1.0  # of the engine per turn; highway-env gets four times as long
+    growth: bool = False  # also measure growth with vehicles, environments and threads
 
 
-def against_stock(env_id: str, seconds: float) -> None:
-    """One environment id: stock, then the engine at several sizes, then with the shield."""
-    stock = decisions_per_cpu_second(envs.make_vec(env_id, 1, shield=None, backend="highway-env"), seconds)
-    print(f"{env_id}: highway-env {stock:.1f} decisions/s per core")
-    for n in SIZES:
-        speed = decisions_per_cpu_second(envs.make_vec(env_id, n, shield=None), seconds)
-        gain = speed / stock
-        print(f"  {n:5d} environments: {speed:9.0f} decisions/s per core, {1e6 / speed:6.1f} us, {gain:6.0f} x")
-    bare = decisions_per_cpu_second(envs.make_vec(env_id, 1024, shield=None), seconds)
-    try:
-        guarded = decisions_per_cpu_second(envs.make_vec(env_id, 1024, shield="override"), seconds)
-    except ValueError as error:
-        print(f"  no shield: {error}")
-        return
-    print(f"  1024 with the shield: {guarded:9.0f} decisions/s per core, {bare / guarded - 1:+.0%} time")
+class Candidate:
+    """One vector environment that takes random actions when it is its turn."""
 
-
-def against_size(seconds: float) -> None:
-    """Growth with the number of vehicles at constant density; the exponent is a fit in log-log."""
-    counts, times = [20, 50, 100, 200, 400], []
-    for count in counts:
-        config = {"vehicles_count": count, "duration": 30}
-        times.append(1 / decisions_per_cpu_second(envs.make_vec("highway-fast-v0", 64, None, config=config), seconds))
-        print(f"  {count:4d} vehicles: {times[-1] * 1e6:7.1f} us per decision")
-    print(f"  exponent {np.polyfit(np.log(counts), np.log(times), 1)[0]:.2f}")
-
-
-def against_threads(seconds: float) -> None:
-    """Wall-clock gain of a second thread."""
-    speeds = []
-    for threads in (1, 2):
-        env = envs.make_vec("highway-fast-v0", 1024, None, threads=threads)
+    def __init__(self, env: Any) -> None:
+        self.env = env
+        self.times: list[float] = []  # seconds per decision, one entry per turn
+        self._actions = np.random.default_rng(0).integers(env.single_action_space.n, size=(64, env.num_envs))
+        self._steps = 0
         env.reset(seed=0)
-        env.step(np.ones(1024, int))
-        start, steps = time.perf_counter(), 0
-        while time.perf_counter() - start < seconds:
-            env.step(np.ones(1024, int))
-            steps += 1
-        speeds.append(steps * 1024 / (time.perf_counter() - start))
-    print(f"  two threads: {speeds[1] / speeds[0]:.2f} x one thread (wall clock, {speeds[0]:.0f} decisions/s)")
+        for _ in range(3):
+            self._step()
+
+    def _step(self) -> None:
+        self.env.step(self._actions[self._steps % len(self._actions)])
+        self._steps += 1
+
+    def take_turn(self, seconds: float, clock: Any = time.process_time) -> None:
+        """Step for some seconds and note the time that a decision took."""
+        start, before = clock(), self._steps
+        while clock() - start < seconds:
+            self._step()
+        self.times.append((clock() - start) / ((self._steps - before) * self.env.num_envs))
+
+    @property
+    def microseconds(self) -> float:
+        """Time per decision, median over the turns."""
+        return 1e6 * float(np.median(self.times))
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--seconds", type=float, default=5.0, help="CPU seconds per measurement")
-    parser.add_argument("--envs", nargs="+", default=["highway-fast-v0", "highway-v0"])
-    parser.add_argument("--growth", action="store_true", help="also measure growth with vehicles and threads")
-    arguments = parser.parse_args()
-    for env_id in arguments.envs:
-        against_stock(env_id, arguments.seconds)
-    if arguments.growth:
-        against_size(arguments.seconds)
-        against_threads(arguments.seconds)
+def against_original(env_id: str, config: Config) -> None:
+    """One environment: highway-env, the engine at several sizes, and the engine with the shield."""
+    original = Candidate(envs.make_vec(env_id, 1, shield=None, backend="highway-env"))
+    engine = {n: Candidate(envs.make_vec(env_id, n, shield=None)) for n in SIZES}
+    shielded = {}
+    if not env_id.startswith(("intersection", "roundabout")):
+        shielded = {mode: Candidate(envs.make_vec(env_id, 1024, shield=mode)) for mode in ("monitor", "override")}
+    for _ in range(config.rounds):
+        original.take_turn(4 * config.seconds)
+        for candidate in (*engine.values(), *shielded.values()):
+            candidate.take_turn(config.seconds)
+    print(f"{env_id}: highway-env {1e6 / original.microseconds:.1f} decisions/s per core")
+    for n, candidate in engine.items():
+        gain = original.microseconds / candidate.microseconds
+        print(f"  {n:5d} environments: {candidate.microseconds:7.1f} us per decision and core, {gain:6.0f} x")
+    for mode, candidate in shielded.items():
+        extra = np.median(np.array(candidate.times) / np.array(engine[1024].times)) - 1
+        print(f"  1024 with the shield ({mode}): {candidate.microseconds:7.1f} us, {extra:+.0%}")
+    sys.stdout.flush()
+
+
+def growth_with_vehicles(config: Config) -> None:
+    """Vehicles at constant density; the exponent is a fit of time against vehicles, both as logarithms."""
+    candidates = {
+        n: Candidate(envs.make_vec("highway-fast-v0", 64, None, config={"vehicles_count": n})) for n in VEHICLES
+    }
+    for _ in range(config.rounds):
+        for candidate in candidates.values():
+            candidate.take_turn(config.seconds)
+    times = [candidate.microseconds for candidate in candidates.values()]
+    print("vehicles: " + ", ".join(f"{n} {t:.0f} us" for n, t in zip(VEHICLES, times, strict=True)))
+    print(f"  exponent {np.polyfit(np.log(VEHICLES), np.log(times), 1)[0]:.2f}", flush=True)
+
+
+def growth_with_environments(config: Config) -> None:
+    """Environments in one batch."""
+    candidates = {n: Candidate(envs.make_vec("highway-fast-v0", n, None)) for n in ENVIRONMENTS}
+    for _ in range(config.rounds):
+        for candidate in candidates.values():
+            candidate.take_turn(config.seconds)
+    times = {n: candidate.microseconds for n, candidate in candidates.items()}
+    print("environments: " + ", ".join(f"{n} {t:.1f} us" for n, t in times.items()), flush=True)
+
+
+def growth_with_threads(config: Config) -> None:
+    """A second thread, by the clock on the wall."""
+    candidates = [Candidate(envs.make_vec("highway-fast-v0", 1024, None, threads=threads)) for threads in (1, 2)]
+    for _ in range(2 * config.rounds):
+        for candidate in candidates:
+            candidate.take_turn(config.seconds, time.perf_counter)
+    gains = np.array(candidates[0].times) / np.array(candidates[1].times)
+    print(f"two threads: {np.median(gains):.2f} x one thread", flush=True)
+
+
+def main(config: Config) -> None:
+    for env_id in config.envs:
+        against_original(env_id, config)
+    if config.growth:
+        growth_with_vehicles(config)
+        growth_with_environments(config)
+        growth_with_threads(config)
     print(f"largest memory of the process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
 
 
 if __name__ == "__main__":
-    main()
+    main(tyro.cli(Config, description=__doc__))

@@ -31,7 +31,7 @@ def kernel(function):
 
     As in `shield.compiled`, any change in what the kernel is made of compiles it anew.
     """
-    dispatcher = _njit(cache=True, nogil=True)(function)
+    dispatcher = _njit(cache=True, nogil=True, _nrt=False, error_model="numpy")(function)
     here = Path(__file__).parent
     dispatcher._cache._cache_file._source_stamp = fingerprint(*here.glob("*.py"), here.parent / "highway.py")
     return dispatcher
