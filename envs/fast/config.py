@@ -178,7 +178,7 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
     asked = ((config or {}).get("action") or {}).get("type", "DiscreteMetaAction")
     if scenario in (MERGE, TWO_WAY, ROUNDABOUT) and asked != "DiscreteMetaAction":
         raise Unsupported(f"action type {asked} in {env_id}", "DiscreteMetaAction")  # nor does highway-env
-    with _drivers_unchanged():
+    with drivers_unchanged():
         wrapped = gym.make(env_id, config=config)
     env: Any = wrapped.unwrapped
     given = env.config
@@ -226,7 +226,7 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
 
 
 @contextmanager
-def _drivers_unchanged():
+def drivers_unchanged():
     """Undo what an `IntersectionEnv` does to the class of all traffic in the process."""
     names = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
     saved = {name: getattr(IDMVehicle, name) for name in names}

@@ -1,14 +1,12 @@
 """Engine and stock simulator side by side, from the same seeds, with the same actions."""
 
-from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 from gymnasium import spaces
-from highway_env.vehicle.behavior import IDMVehicle
 
 import envs
-from envs.fast.config import compile_scenario
+from envs.fast.config import compile_scenario, drivers_unchanged
 from envs.fast.draws import generator_state
 from envs.fast.engine import DISABLED, Engine
 from envs.fast.infos import info_of, step_infos
@@ -31,18 +29,6 @@ class Comparison(NamedTuple):
     discrete: list[str]  # flags, lanes, indices, generators or infos that differ
 
 
-@contextmanager
-def stock_drivers():
-    """Undo what an intersection environment does to the class attributes of all traffic."""
-    names = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
-    saved = {name: getattr(IDMVehicle, name) for name in names}
-    try:
-        yield
-    finally:
-        for name, value in saved.items():
-            setattr(IDMVehicle, name, value)
-
-
 def actions_of(policy: str, space, rng):
     """Next action of a policy."""
     if isinstance(space, spaces.Box):
@@ -60,7 +46,7 @@ def compare(env_id, seeds, policy="random", config=None, shield=None, max_steps=
     Args:
       until: called with the number of decisions so far; stops when it returns True.
     """
-    with stock_drivers():
+    with drivers_unchanged():
         return _compare(env_id, list(seeds), policy, config, shield, max_steps, until)
 
 

@@ -3,17 +3,17 @@
 import gymnasium as gym
 import numpy as np
 import pytest
-from lockstep import stock_drivers
 
 import envs
+from envs.fast.config import drivers_unchanged
 from envs.fast.replay import read, show
 
 ENV = "highway-fast-v0"
 
 
 @pytest.fixture(autouse=True)
-def _stock_drivers():
-    with stock_drivers():
+def _drivers_unchanged():
+    with drivers_unchanged():
         yield
 
 
