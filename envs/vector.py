@@ -1,5 +1,6 @@
 """Many environments at once, on either simulator."""
 
+import math
 from functools import partial
 
 import gymnasium as gym
@@ -48,6 +49,11 @@ def make_vec(
         raise ValueError(f"backend = {backend!r}: expected one of {', '.join(BACKENDS)}")
     if shield is not None and shield not in MODES:
         raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
+    for name, value in (("num_envs", num_envs), ("threads", threads)):
+        if not (isinstance(value, int) and value >= 1):
+            raise ValueError(f"{name} = {value!r}: expected a whole number >= 1")
+    if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
+        raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
     if backend == "highway-env":
         options = dict(params=params, rules=rules, intervention_penalty=intervention_penalty, config=config)
         one = partial(_make_counted, env_id, shield, options)

@@ -144,8 +144,13 @@ class FastVectorEnv(VectorEnv):
     def _commands(self, actions: np.ndarray):
         if len(actions) != self.num_envs:
             raise ValueError(f"{len(actions)} actions given; expected {self.num_envs}")
-        if len(self.scenario.labels):
+        count = len(self.scenario.labels)
+        if count:
+            if not np.issubdtype(actions.dtype, np.integer) or actions.min() < 0 or actions.max() >= count:
+                raise ValueError(f"actions = {actions}: expected integers from 0 to {count - 1}")
             return actions.astype(np.int64), None
+        if actions.shape != self.action_space.shape or not np.isfinite(actions).all():
+            raise ValueError(f"actions = {actions}: expected finite numbers, shape {self.action_space.shape}")
         return None, self.scenario.commands(actions)
 
     def _shaped(self, observations: np.ndarray) -> np.ndarray:

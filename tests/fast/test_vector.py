@@ -154,3 +154,30 @@ def test_an_intervention_penalty_is_taken_from_the_reward():
     paid, _ = total(0.5)
     assert fractions.max() > 0
     np.testing.assert_allclose(bare - paid, 0.5 * fractions)
+
+
+@pytest.mark.parametrize("name", ["num_envs", "threads"])
+def test_counts_below_one_are_errors(name):
+    with pytest.raises(ValueError, match=f"{name} = 0: expected a whole number >= 1"):
+        envs.make_vec(**({"env_id": ENV, "num_envs": 2} | {name: 0}))
+
+
+def test_a_bad_penalty_is_an_error():
+    with pytest.raises(ValueError, match="intervention_penalty"):
+        envs.make_vec(ENV, 2, intervention_penalty=-1.0)
+
+
+@pytest.mark.parametrize("actions", [[1, 5], [-1, 1], [0.5, 1.0]])
+def test_actions_outside_the_space_are_errors(actions):
+    env = envs.make_vec(ENV, 2, shield=None)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="integers from 0 to 4"):
+        env.step(np.array(actions))
+
+
+@pytest.mark.parametrize("actions", [[[0.0, np.nan], [0.0, 0.0]], [[0.0], [0.0]]])
+def test_continuous_actions_must_be_finite_and_of_the_right_shape(actions):
+    env = envs.make_vec(ENV, 2, shield=None, config={"action": {"type": "ContinuousAction"}})
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="finite numbers"):
+        env.step(np.array(actions, np.float32))
