@@ -1,11 +1,11 @@
-"""How far a car gets: the distances behind every RSS definition.
+"""How far a car gets and when: the distances and times behind every RSS definition.
 
-All functions take floats or arrays that broadcast, in SI units, and are compiled.
+All functions are compiled, in SI units. Distances take floats or arrays that broadcast, times floats.
 """
 
 import numpy as np
 
-from shield.compiled import compiled_for_arrays
+from shield.compiled import compiled, compiled_for_arrays
 
 _TINY = 1e-300  # stands in for a positive divisor where the dividend is 0
 
@@ -67,6 +67,46 @@ def travel(tau, v, rho, a, b, v_cap=np.inf):
     t_brake = np.minimum(np.maximum(tau - rho, 0.0), v_rho / b)
     response = response_distance(v, np.minimum(tau, rho), a, v_cap)
     return response + v_rho * t_brake - 0.5 * b * t_brake**2
+
+
+@compiled
+def time_to_cover_accelerating(distance, v, a, v_cap):
+    """Time to cover a distance while accelerating at `a` >= 0 up to `v_cap`, from v >= 0 [s]; inf if it never is."""
+    if distance <= 0.0:
+        return 0.0
+    a = max(a, _TINY)
+    v_top = max(v_cap, v)
+    to_cap = (v_top**2 - v**2) / (2 * a)
+    if distance <= to_cap:
+        end_speed = np.sqrt(v**2 + 2 * a * distance)
+        return 2 * distance / (v + end_speed) if a > _TINY or v > 0.0 else np.inf
+    return (v_top - v) / a + (distance - to_cap) / v_top
+
+
+@compiled
+def time_to_cover_braking(distance, v, b):
+    """Time to cover a distance while braking at `b` > 0 from v >= 0 [s]; inf if the car stops before."""
+    if distance <= 0.0:
+        return 0.0
+    if distance > stopping_distance(v, b):
+        return np.inf
+    return 2 * distance / (v + np.sqrt(max(v**2 - 2 * b * distance, 0.0)))
+
+
+@compiled
+def time_to_cover(distance, v, rho, a, b, v_cap=np.inf):
+    """Time to cover a distance under "accelerate at `a` for `rho`, then brake at `b`" [s]; inf if it stops before."""
+    t = time_to_cover_accelerating(distance, v, a, v_cap)
+    if t <= rho:
+        return t
+    rest = distance - response_distance(v, rho, a, v_cap)
+    return rho + time_to_cover_braking(rest, speed_after_response(v, rho, a, v_cap), b)
+
+
+@compiled
+def time_to_stop(v, rho, a, b, v_cap=np.inf):
+    """Time to rest under "accelerate at `a` for `rho`, then brake at `b`", from v >= 0 [s]."""
+    return rho + speed_after_response(v, rho, a, v_cap) / b
 
 
 @compiled_for_arrays

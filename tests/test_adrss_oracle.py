@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from adrss_objects import become, new_object, physics, rss
 
+from shield.kinematics import reach, time_to_cover
 from shield.lateral import d_min_lateral
 from shield.longitudinal import d_min_opposite_direction, d_min_same_direction, is_safe_longitudinally
 from shield.pair import ROAD_USER, assess
@@ -118,6 +119,24 @@ def test_lateral_distances_agree_but_for_the_clamp_around_mu():
             clamped += 1
         assert d_min_lateral(u_left, u_right, left, right, "no_credit") >= expected - PRECISION
     assert CASES / 20 < clamped < CASES / 2
+
+
+def test_times_to_cover_a_distance_agree():
+    duration, arrived = physics.Duration(0.0), 0
+    for car, _, u, _, rng in list(cases(seed=5))[:3000]:
+        v, rho, a, b = abs(u) * 12.0, car.response_time, car.a_max_accel, car.a_min_brake
+        end = reach(v, rho, a, b, car.v_cap)
+        distance = end * rng.choice([rng.uniform(0.0, 0.98), rng.uniform(1.02, 2.0)]) + 0.01
+        motion = [physics.Speed(v), physics.Speed(car.v_cap), physics.Duration(rho)]
+        motion += [physics.Acceleration(a), physics.Acceleration(-b)]
+        assert positions.calculateTimeToCoverDistance(*motion, physics.Distance(distance), duration)
+        t = time_to_cover(distance, v, rho, a, b, car.v_cap)
+        arrived += math.isfinite(t)
+        # its own precision decides at the cap, at the end of the way and at that of the response time: just after
+        # the latter it may answer with a time after standstill
+        if min(abs(car.v_cap - v), abs(v + a * rho - car.v_cap), abs(distance - end), abs(t - rho)) > 0.1:
+            assert min(t, 1e6) == pytest.approx(duration.mDuration, rel=0.0, abs=5e-3)  # forever is 1e6 s there
+    assert arrived > 1000
 
 
 def judged(checker, time, ego, other, lon, lat):

@@ -19,6 +19,8 @@ from shield.kinematics import (
     speed_after_response,
     speed_envelope,
     stopping_distance,
+    time_to_cover,
+    time_to_stop,
     travel,
 )
 from shield.lateral import approach_no_credit, d_min_lateral
@@ -42,17 +44,26 @@ from shield.response import (
     lateral_speed_limit,
     step_threshold,
 )
+from shield.right_of_way import (
+    APART,
+    ORDER,
+    STOP,
+    UNSEEN,
+    Approach,
+    can_stop_before,
+    distances_to_area,
+    gap_behind,
+    is_ahead,
+    junction_items,
+    must_brake,
+    step_junction,
+)
 
 FILE = json.loads((Path(__file__).parent / "data" / "adrss-vectors.json").read_text())
 VECTORS = {vector["id"]: vector for vector in FILE["vectors"]}
 PRECISION = 1e-3
 
 OUT_OF_SCOPE = {
-    "time_to_cover_distance": "no function of the shield yet: junctions need it",
-    "time_to_stop": "no function of the shield yet: junctions need it",
-    "intersection": "junctions (Defs. 14 to 18) are not implemented",
-    "intersection_world_sweep": "junctions (Defs. 14 to 18) are not implemented",
-    "extraction_intersection": "junctions (Defs. 14 to 18) are not implemented",
     "unstructured": "unstructured roads (Defs. 19 to 22) are not implemented",
     "drive_away_heading": "unstructured roads (Defs. 19 to 22) are not implemented",
 }
@@ -69,6 +80,9 @@ DIFFERENT = {
     "threshold_same_direction-007": "test_danger_from_the_start_is_answered_on_both_axes",
     "response_lateral-003": "test_danger_from_the_start_is_answered_on_both_axes",
     "response_lateral-005": "test_danger_from_the_start_is_answered_on_both_axes",
+    "intersection-001": "test_without_priority_all_must_be_able_to_stop_not_one",
+    "intersection_world_sweep-003": "test_without_priority_all_must_be_able_to_stop_on_the_way_in_too",
+    "intersection-011": "test_a_car_with_priority_brakes_too_if_both_could_have_stopped",
 }
 
 
@@ -162,6 +176,22 @@ def test_lateral_distance_of_the_stated_braking_pattern(given, answer):
     of_other = approach_no_credit(20.0, own)
     own_approach = d_min_lateral(given["speed"], -20.0, own, own, "pair") - of_other
     assert own_approach == close(answer["distance"])
+
+
+@vectors("time_to_cover_distance")
+def test_time_to_cover_a_distance(given, answer):
+    inputs = {name: float(value) for name, value in given.items()}
+    v, rho, cap = inputs["speed"], inputs["response_time"], inputs["max_speed_on_acceleration"]
+    t = time_to_cover(inputs["distance"], v, rho, inputs["accel_until_response"], -inputs["accel_after_response"], cap)
+    assert t == close(answer["time"])
+
+
+@vectors("time_to_stop")
+def test_time_to_stop(given, answer):
+    inputs = {name: float(value) for name, value in given.items()}
+    v, rho, cap = inputs["speed"], inputs["response_time"], inputs["max_speed_on_acceleration"]
+    t = time_to_stop(v, rho, inputs["accel_until_response"], -inputs["accel_after_response"], cap)
+    assert t == close(answer["time"])
 
 
 # ---------------------------------------------------------------- safe distances
@@ -284,6 +314,113 @@ def test_every_step_has_the_distance_of_the_released_library(name):
         assert d == close(answer["lon_safe_distance"])
 
 
+# ---------------------------------------------------------------- right of way
+
+
+def approach(state):
+    """A car of the vectors, a point there, on its way into the intersection."""
+    enter, leave, v = (float(state[name]) for name in ("enter", "leave", "lon"))
+    return Approach(enter, leave, 0.0, v, float(state["has_priority"]))
+
+
+def junction_steps(steps):
+    """(items, must the ego brake?) after each step; steps are pairs of `Approach` with both drivers' parameters."""
+    threshold, rows = UNSEEN, []
+    for ego, other, ego_params, other_params in steps:
+        items = junction_items(ego, other, ego_params, other_params)
+        threshold = step_junction(threshold, ego, other, items)
+        brakes = must_brake(threshold.items, threshold.priority > 0, threshold.order)
+        rows.append((items, threshold.since > 0 and brakes))
+    return rows
+
+
+def intersection_steps(given):
+    return [
+        (
+            approach(step["ego"]),
+            approach(step["other"]),
+            params(step["ego"]["dynamics"]),
+            params(step["other"]["dynamics"]),
+        )
+        for step in given["steps"]
+    ]
+
+
+@vectors("intersection")
+def test_safety_and_response_at_an_intersection(given, answer):
+    rows = junction_steps(intersection_steps(given))
+    expected = [(step["lon_safe"], step["lon"] == "BrakeMin") for step in answer["steps"]]
+    assert [(items != 0, brakes) for items, brakes in rows] == expected
+
+
+def test_every_item_of_an_intersection_has_the_distance_of_the_released_library():
+    seen = set()
+    for vector in VECTORS.values():
+        if vector["category"] == "intersection":
+            for step, answer in zip(intersection_steps(vector["inputs"]), vector["wheel"]["steps"], strict=True):
+                ego, other, ego_params, other_params = step
+                seen.add(answer["evaluator"])
+                if answer["evaluator"] == "IntersectionEgoPriorityOtherAbleToStop":
+                    needed, car, driver = answer["safe_distance"], other, other_params
+                    assert can_stop_before(needed + PRECISION, car.v, driver)
+                    assert not can_stop_before(needed - PRECISION, car.v, driver)
+                elif answer["evaluator"] == "IntersectionEgoInFront":
+                    assert d_min_same_direction(other.v, ego.v, other_params, ego_params) == close(
+                        max(answer["safe_distance"], 0.0)
+                    )
+                    assert is_ahead(ego, other, ego_params, other_params)
+    assert len(seen) == 3
+
+
+@vectors("extraction_intersection")
+def test_distances_to_the_intersection_from_occupied_regions(given, answer):
+    start, end = given["approach_length"], given["approach_length"] + given["intersection_length"]
+    cars = {}
+    for name in ("ego", "object"):
+        rear, front = (start * share for share in given[f"{name}_lon"])
+        cars[name] = distances_to_area((rear + front) / 2, (front - rear) / 2, start, end), front - rear
+    (enter, leave), length = cars["ego"]
+    (other_enter, other_leave), other_length = cars["object"]
+    assert (enter, leave) == (close(answer["ego_enter"]), close(answer["ego_leave"]))
+    assert (other_enter, other_leave) == (close(answer["other_enter"]), close(answer["other_leave"]))
+    ego, other = Approach(enter, math.inf, length, 0.0, 0.0), Approach(other_enter, math.inf, other_length, 0.0, 0.0)
+    assert gap_behind(other, ego) == close(answer["lon_distance"])
+
+
+def sweep(given):
+    """Both cars for every position of the ego on the way in: lengths are ranges, the worst of each counts."""
+
+    def on(road, segment, lon_range, v, priority):
+        pieces = [piece["length"] for piece in road if "intersection" not in piece]
+        before = [piece["id"] for piece in road].index(segment)
+        shortest, longest = ([float(piece[k]) for piece in pieces] for k in (0, 1))
+        rear = sum(shortest[:before]) + lon_range[0] * shortest[before]
+        front = sum(longest[:before]) + lon_range[1] * longest[before]
+        return Approach(sum(shortest) - front, math.inf, front - rear, v, priority)
+
+    has_priority = float(given["constellation_type"] == "IntersectionEgoHasPriority")
+    ego_params, other_params = params(given["ego_dynamics"]), params(given["object_dynamics"])
+    other = on(given["object_road"], given["object_segment"], given["object_lon_range"], given["object_speed"], 0.0)
+    for segment in (0, 3):
+        for i in range(91):
+            ego = on(given["ego_road"], segment, (0.01 * i, 0.01 * i + 0.1), given["ego_speed"], has_priority)
+            yield ego, other, ego_params, other_params
+
+
+def braking_positions(given):
+    """(segment, i) at which the ego must brake."""
+    places = [(segment, i) for segment in (0, 3) for i in range(91)]
+    rows = junction_steps(sweep(given))
+    return [place for place, (_, brakes) in zip(places, rows, strict=True) if brakes]
+
+
+@vectors("intersection_world_sweep")
+def test_a_car_that_drives_into_a_merge_brakes_from_the_same_place_on(given, answer):
+    (segment, first), (_, last) = answer["first_brake"], answer["last_brake"]
+    braking = braking_positions(given)
+    assert braking[: answer["n"]] == [(segment, i) for i in range(first, last + 1)]
+
+
 # ---------------------------------------------------------------- deliberate differences
 
 
@@ -376,6 +513,46 @@ def test_lateral_braking_is_asked_only_of_a_car_that_moves_toward_the_other():
     assert lateral_response(-1.0, 3.0, 0.3, car)[1] == -0.8
     assert lateral_response(-1.0, 3.0, -0.3, car)[:2] == (-math.inf, math.inf)
     assert lateral_speed_limit(100, 0.0, car, 1 / 15) == 0.0
+
+
+def test_without_priority_all_must_be_able_to_stop_not_one():
+    # there one car that can stop is enough, and the other one, which cannot, need not even brake
+    vector = VECTORS["intersection-001"]
+    steps = intersection_steps(vector["inputs"])
+    assert vector["wheel"]["steps"][1]["lon_safe"]
+    ego, other, ego_params, other_params = steps[1]
+    assert can_stop_before(other.enter, other.v, other_params) and not can_stop_before(ego.enter, ego.v, ego_params)
+    (first, brakes_first), (second, brakes_second) = junction_steps(steps)
+    assert (first & STOP, second) == (0, 0)
+    assert not brakes_first and brakes_second
+
+
+def test_without_priority_all_must_be_able_to_stop_on_the_way_in_too():
+    # there the ego brakes from i = 55 on, where it can no longer stop; here from 11 on, as with priority: the other
+    # could not stop all along, and from there on it is too near to be followed
+    vector = VECTORS["intersection_world_sweep-003"]
+    places = list(sweep(vector["inputs"]))[91:]
+    could_stop = [i for i, (ego, _, car, _) in enumerate(places) if can_stop_before(ego.enter, ego.v, car)]
+    assert could_stop[-1] == 54 and vector["wheel"]["first_brake"] == [3, 55]
+    assert not any(can_stop_before(other.enter, other.v, car) for _, other, _, car in places)
+    assert braking_positions(vector["inputs"])[0] == (3, 11)
+
+
+def test_whoever_was_behind_brakes_until_it_is_safe_even_if_it_has_come_out_in_front():
+    # there the order of the moment counts: the ego brakes up to i = 64, where it gets ahead
+    vector = VECTORS["intersection_world_sweep-001"]
+    assert vector["wheel"]["last_brake"] == [3, 64]
+    assert braking_positions(vector["inputs"])[-1] == (3, 90)
+
+
+def test_a_car_with_priority_brakes_too_if_both_could_have_stopped():
+    # there it does nothing, because the other should have stopped; here every item that was true is answered
+    vector = VECTORS["intersection-011"]
+    assert vector["wheel"]["steps"][1]["lon"] == "None"
+    (first, brakes_first), (second, brakes_second) = junction_steps(intersection_steps(vector["inputs"]))
+    assert (first, second) == (STOP | APART, 0)
+    assert not brakes_first and brakes_second
+    assert must_brake(STOP | APART, True, -1.0) and not must_brake(STOP, True, -1.0) and must_brake(ORDER, True, -1.0)
 
 
 # ---------------------------------------------------------------- nothing is forgotten

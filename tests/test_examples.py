@@ -40,6 +40,18 @@ from shield.response import (
     remember,
     step_threshold,
 )
+from shield.right_of_way import (
+    Approach,
+    can_stop_before,
+    first_arrival,
+    gap_behind,
+    is_ahead,
+    is_safe_across_routes,
+    last_departure,
+    lateral_interval,
+    longitudinal_order,
+    strip_gap,
+)
 
 EXAMPLES = json.loads((Path(__file__).parent / "data" / "rss-examples.json").read_text())
 
@@ -47,12 +59,6 @@ OUT_OF_SCOPE = {
     "lemma1": "statistics of validation, no function of the shield",
     "def11_naive": "evasive manoeuvres (Defs. 11 to 13) are not implemented",
     "def12_evasive": "evasive manoeuvres (Defs. 11 to 13) are not implemented",
-    "def14_interval": "junctions (Defs. 14 to 18) are not implemented",
-    "def14_gap": "junctions (Defs. 14 to 18) are not implemented",
-    "def16_order": "junctions (Defs. 14 to 18) are not implemented",
-    "def17_1": "junctions (Defs. 14 to 18) are not implemented",
-    "def17_2": "junctions (Defs. 14 to 18) are not implemented",
-    "def17_3": "junctions (Defs. 14 to 18) are not implemented",
     "def20": "unstructured roads (Defs. 19 to 22) are not implemented",
     "def21_brake_endpoint": "unstructured roads (Defs. 19 to 22) are not implemented",
     "pedestrian_reach": "pedestrians are not implemented",
@@ -324,6 +330,49 @@ def drive_to_contact(extra, b_front, a_rear, b_rear, ego_is_rear, dt=0.01):
             one["s"] += one["speed"] * dt
             one["speed"] = max(one["speed"] + a * dt, 0.0)
     return {"collision": False, "min_gap": smallest, "blamed": []}
+
+
+# ---------------------------------------------------------------- right of way
+
+
+def def14_interval(x, v):
+    return list(lateral_interval(x, v, CAR))
+
+
+def def14_gap(car1, car2):
+    # lanes of radius 20 and 24 m around one centre, cars 2 m wide, positive outward
+    (x_1, u_1, rho_1), (x_2, u_2, rho_2) = car1, car2
+    one, two = side(rho_1), side(rho_2)
+    strips = lateral_interval(x_1, u_1, one), lateral_interval(x_2, u_2, two)
+    gap = strip_gap(24.0 - 20.0, *strips, 1.0, 1.0)
+    return {"strip_gap": gap, "safe": bool(is_safe_across_routes(gap, one, two))}
+
+
+def def16_order(situation):
+    # distances to the shared part, negative on it
+    enter = {
+        "both approaching, c1 nearer": (10.0, 20.0),
+        "both approaching, equal": (10.0, 10.0),
+        "c1 already on shared part, ahead": (-15.0, -5.0),
+        "c2 on shared part, ahead": (3.0, -5.0),
+    }[situation]
+    return longitudinal_order(*enter)
+
+
+def def17_1(v, dist_enter):
+    stop_reach = reach(float(v), CAR.response_time, CAR.a_max_accel, CAR.a_min_brake, CAR.v_cap)
+    return {"stop_reach": stop_reach, "holds": bool(can_stop_before(float(dist_enter), float(v), CAR))}
+
+
+def def17_2(v1, d1, v2, d2):
+    front, rear = (Approach(float(d), INF, 5.0, float(v), 0.0) for v, d in ((v1, d1), (v2, d2)))
+    need = d_min_same_direction(rear.v, front.v, CAR, CAR)
+    return {"gap": gap_behind(rear, front), "need": need, "holds": bool(is_ahead(front, rear, CAR, CAR))}
+
+
+def def17_3(v, d_enter, d_leave):
+    one = Approach(float(d_enter), float(d_leave), 5.0, float(v), 0.0)
+    return ["inf" if math.isinf(t) else t for t in (first_arrival(one, CAR), last_departure(one, CAR))]
 
 
 # ---------------------------------------------------------------- comparison

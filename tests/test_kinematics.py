@@ -13,6 +13,10 @@ from shield.kinematics import (
     speed_after_response,
     speed_envelope,
     stopping_distance,
+    time_to_cover,
+    time_to_cover_accelerating,
+    time_to_cover_braking,
+    time_to_stop,
     travel,
 )
 
@@ -107,6 +111,44 @@ def test_travel_is_the_area_under_the_speed_envelope_and_ends_at_the_reach(v_cap
     area = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * 1e-4)))
     assert travel(tau, 9.0, 0.8, 2.0, 3.0, v_cap) == pytest.approx(area, abs=1e-5)
     assert travel(6.0, 9.0, 0.8, 2.0, 3.0, v_cap) == pytest.approx(reach(9.0, 0.8, 2.0, 3.0, v_cap))
+
+
+def test_times_by_hand():
+    # from rest at 2 m/s^2: 9 m in 3 s; up to 4 m/s: 4 m in 2 s, then 5 m in 1.25 s
+    assert time_to_cover_accelerating(9.0, 0.0, 2.0, NO_CAP) == pytest.approx(3.0)
+    assert time_to_cover_accelerating(9.0, 0.0, 2.0, 4.0) == pytest.approx(3.25)
+    # from 10 m/s at 4 m/s^2: 8 m in 1 s, 12.5 m to rest in 2.5 s
+    assert time_to_cover_braking(8.0, 10.0, 4.0) == pytest.approx(1.0)
+    assert time_to_cover_braking(12.5, 10.0, 4.0) == pytest.approx(2.5)
+    assert time_to_cover_braking(12.6, 10.0, 4.0) == math.inf
+    # 10 m/s, 1 s at 2 m/s^2: 11 m; then from 12 m/s at 4 m/s^2 10 m more in 1 s, at rest after 3 s
+    assert time_to_cover(21.0, 10.0, 1.0, 2.0, 4.0) == pytest.approx(2.0)
+    assert time_to_stop(10.0, 1.0, 2.0, 4.0) == 4.0
+
+
+def test_times_at_the_ends_of_their_ranges():
+    assert time_to_cover_accelerating(5.0, 0.0, 0.0, NO_CAP) == math.inf
+    assert time_to_cover_accelerating(5.0, 0.0, 0.0, 3.0) == math.inf
+    assert time_to_cover_accelerating(5.0, 2.0, 0.0, NO_CAP) == 2.5
+    assert time_to_cover_accelerating(5.0, 2.0, 0.0, 1.0) == 2.5  # above the cap: keeps its speed
+    assert time_to_cover_accelerating(8.0, 4.0, 3.0, 4.0) == 2.0
+    assert time_to_cover(0.0, 0.0, 1.0, 0.0, 4.0) == time_to_cover(-3.0, 0.0, 1.0, 0.0, 4.0) == 0.0
+    assert time_to_cover(1.0, 0.0, 1.0, 0.0, 4.0) == math.inf
+    assert time_to_cover_braking(0.0, 0.0, 4.0) == 0.0
+
+
+@pytest.mark.parametrize("v", [0.0, 3.0, 17.0])
+@pytest.mark.parametrize("v_cap", [5.0, 20.0, NO_CAP])
+@pytest.mark.parametrize("a", [0.0, 0.7, 3.5])
+def test_the_time_to_cover_a_distance_is_when_the_drive_gets_there(v, v_cap, a):
+    rho, b = 1.3, 4.5
+    end = reach(v, rho, a, b, v_cap)
+    for part in (0.1, 0.4, 0.9, 0.999):
+        t = time_to_cover(part * end, v, rho, a, b, v_cap)
+        assert end == 0.0 or travel(t, v, rho, a, b, v_cap) == pytest.approx(part * end)
+        assert t <= time_to_stop(v, rho, a, b, v_cap)
+    assert time_to_cover(end + 1e-6, v, rho, a, b, v_cap) == math.inf
+    assert travel(time_to_stop(v, rho, a, b, v_cap), v, rho, a, b, v_cap) == pytest.approx(end)
 
 
 @pytest.mark.parametrize(
