@@ -7,13 +7,16 @@ from highway_env.road.lane import CircularLane, SineLane, StraightLane
 from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 
-from shield.blame import DUTIES, VERDICTS, Log, judge_contact, judge_frame
+from shield.blame import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
 from shield.command import Command
-from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_STEER, Body, shield_frame
+from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_GO, RESPONSE_STEER, Body, shield_frame
+from shield.examined import TABLE
 from shield.geometry import ARC_START, LENGTH, PIECE_FIELDS, largest_half_extents, make_road, wrap_angle
+from shield.junction import CAUTIOUS
 from shield.lane_frame import same_frame, to_lane_frame_all
 from shield.pair import ROAD_USER
 from shield.params import RSSParams, Rules
+from shield.plans import ANY
 from shield.response import LAT, LON, MEMORY, catch_up, forget_safe
 
 _JOIN = 0.5  # lane ends closer than this belong together [m]
@@ -21,6 +24,9 @@ _CHAIN = 8  # lanes followed in either direction
 _SAMPLE = 2.0  # spacing of the pieces that stand in for a curve of changing curvature [m]
 
 AXES = {0: "inherited", LON: "longitudinal", LAT: "lateral", LON | LAT: "both"}
+
+
+LANES, PLANS = range(2)  # distances along the lane (Defs. 1-10), or plans through junctions (Defs. 14-18)
 
 
 class Settings(NamedTuple):
@@ -31,6 +37,11 @@ class Settings(NamedTuple):
     rules: Rules
     overrides: bool  # False: watch only
     dt: float  # length of a simulation frame [s]
+    scheme: int = LANES  # what keeps the ego safe: LANES or PLANS
+    entry: int = CAUTIOUS  # whom the ego expects to give way at junctions: index into `shield.junction.ENTRIES`
+    intent: int = ANY  # which routes it expects of others: index into `shield.plans.INTENTS`
+    waits_anywhere: bool = False  # it may also wait inside a junction, in the way of nobody who is there yet
+    examine: int = TABLE  # against whom plans are checked: index into `shield.examined.EXAMINED`
 
 
 class Frame(NamedTuple):
@@ -101,11 +112,8 @@ def _neighbour(network, index, forward: bool):
     return None
 
 
-def road_through(network, index) -> np.ndarray:
-    """The road along a lane as `[K, 8]` pieces: the lane itself, what leads to it and what follows.
-
-    Arc length counts from the start of the lane `index`.
-    """
+def chain_through(network, index) -> list[tuple]:
+    """Lanes along the road of a lane: what leads to it, itself, and what follows."""
     chain = [index]
     for forward in (False, True):
         for _ in range(_CHAIN):
@@ -113,8 +121,16 @@ def road_through(network, index) -> np.ndarray:
             if found is None or found in chain:
                 break
             chain = [*chain, found] if forward else [found, *chain]
+    return chain
+
+
+def road_through(network, index) -> np.ndarray:
+    """The road along a lane (`chain_through`) as `[K, 8]` pieces.
+
+    Arc length counts from the start of the lane `index`.
+    """
     rows, start, offset = [], 0.0, 0.0
-    for lane_index in chain:
+    for lane_index in chain_through(network, index):
         if lane_index == index:
             offset = start
         for piece in _pieces_of(network.get_lane(lane_index)):
@@ -161,7 +177,7 @@ class ShieldedEgo:
         self.boxes = np.zeros((0, 4))
         self.last = (np.zeros(1, ROAD_USER)[0], np.zeros(0, ROAD_USER))  # ego and others on the frame before
         self.roads: dict = {}
-        self.lane_index = None
+        self.lane_index: tuple | None = None
         self.road = np.zeros((0, PIECE_FIELDS))
         self.jumped = False
         self.contact: dict | None = None
@@ -190,12 +206,13 @@ class ShieldedEgo:
         steering = float(nominal["steering"])  # single precision where the agent's action is
         users, ego, curvature = self._sense()
         wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
+        granted = self._grant(wish)
         report = shield_frame(
             ego,
             users,
             *self.last,
             self.memory,
-            wish,
+            granted,
             Body(*self.body, curvature),
             settings.ego,
             settings.other,
@@ -217,6 +234,10 @@ class ShieldedEgo:
         self._count(report, pairs, broken, command.acceleration - wish.acceleration, steered - steering)
         if self.record is not None:
             self.record.append(Frame(ego, users, tuple(self.keys), command, curvature, self.jumped, self.poses))
+
+    def _grant(self, wish: Command) -> Command:
+        """What is left of a command before the lanes have their say."""
+        return wish
 
     def _count(self, report, pairs: int, broken: int, acceleration_change: float, steering_change: float) -> None:
         tally, overrides = self.tally, self.settings.overrides
@@ -248,22 +269,29 @@ class ShieldedEgo:
     def _sense(self):
         """Everybody else `[N]` and the ego as `ROAD_USER` records in the lane frame of the ego."""
         vehicle, settings = self.vehicle, self.settings
-        road = vehicle.road
-        others = [v for v in road.vehicles if v is not vehicle]
-        others += [o for o in road.objects if not isinstance(o, Landmark) and o.collidable]
-        if others != self.others or len(self.before) != len(others) + 1:
-            self._follow(others)
+        self._meet()
         self._choose_frame()
 
+        others = self.others
         everybody = [*others, vehicle]
         poses = np.array([(*v.position, v.heading, v.speed) for v in everybody], dtype=float)
         out = np.zeros(len(everybody), ROAD_USER)
         out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in others]
         out["in_own_lane"] = [self._in_own_lane(v) for v in everybody]
+        out["elsewhere"][:-1] = [self._is_elsewhere(v) for v in others]
         curvature = to_lane_frame_all(self.road, poses, self.before, self.boxes, settings.dt, out)
         self.before = poses[:, :2]
         self.poses = poses
         return out[:-1], out[-1], curvature
+
+    def _meet(self) -> None:
+        """Find out who is on the road."""
+        vehicle = self.vehicle
+        road = vehicle.road
+        others = [v for v in road.vehicles if v is not vehicle]
+        others += [o for o in road.objects if not isinstance(o, Landmark) and o.collidable]
+        if others != self.others or len(self.before) != len(others) + 1:
+            self._follow(others)
 
     def _follow(self, others: list) -> None:
         """Carry the memory over to a new set of road users, by identity."""
@@ -301,6 +329,10 @@ class ShieldedEgo:
                 forget_safe(memory)
         self.lane_index, self.road = index, road
 
+    def _is_elsewhere(self, other) -> bool:
+        """Does a road user drive on a road that the ego's lane does not belong to?"""
+        return False
+
     def _in_own_lane(self, other) -> bool:
         """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
         if other.lane is None or np.cos(other.heading - self.vehicle.heading) > 0.0:
@@ -330,20 +362,27 @@ class ShieldedEgo:
         rules = (settings.ego, settings.other, settings.rules, settings.dt)
         for i in touching:
             catch_up(self.memory[i], self.last[0], self.last[1][i], *rules)
-        verdicts = [judge_contact(ego, users[i], self.memory[i], *rules) for i in touching]
+        verdicts = [self._verdict(i, ego, users[i]) for i in touching]
         # several at once: the one that weighs most against the ego counts
         weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
         i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: weight[VERDICTS[pair[1].verdict]])
         return {
             "verdict": VERDICTS[verdict.verdict],
             "partner": self._index_on_road(i),
-            "danger": AXES[int(verdict.axes)],
+            "danger": self._danger(i, int(verdict.axes)),
             "seconds_since_threshold": verdict.frames * settings.dt,
             "ego_duty": DUTIES[verdict.ego_duty],
             "ego_excess": float(verdict.ego_excess),
             "other_duty": DUTIES[verdict.other_duty],
             "other_excess": float(verdict.other_excess),
         }
+
+    def _verdict(self, i: int, ego, user) -> Verdict:
+        settings = self.settings
+        return judge_contact(ego, user, self.memory[i], settings.ego, settings.other, settings.rules, settings.dt)
+
+    def _danger(self, i: int, kind: int) -> str:
+        return AXES[kind]
 
     def _touches(self, other) -> bool:
         """highway-env's own collision test, in its own order, without its effects."""
@@ -366,6 +405,8 @@ def _box(user, heading_bound: float) -> tuple[float, float, float, float]:
 
 def response_name(response: int) -> str:
     """Name of a sum of RESPONSE_* bits."""
+    if response & RESPONSE_GO:
+        return "go"
     brakes = response & (RESPONSE_BRAKE | RESPONSE_CUT_IN)
     if response & RESPONSE_STEER:
         return "both" if brakes else "lateral"

@@ -2,6 +2,7 @@
 
 import math
 from functools import partial
+from typing import Any
 
 import gymnasium as gym
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
@@ -10,8 +11,8 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 from envs.fast.config import compile_scenario
 from envs.fast.vector import FastVectorEnv
 from envs.scenarios import make
-from envs.wrapper import MODES, check_environment, check_params, settings_for
-from shield.params import PRESETS, Preset, RSSParams, Rules
+from envs.wrapper import MODES, check_conduct, check_environment, check_params, settings_for
+from shield.params import Preset, RSSParams, Rules
 
 BACKENDS = ("fast", "highway-env")
 
@@ -21,12 +22,16 @@ def make_vec(
     num_envs: int,
     shield: str | None = "override",
     backend: str = "fast",
-    params: Preset | tuple[RSSParams, RSSParams] = PRESETS["simulator"],
+    params: Preset | tuple[RSSParams, RSSParams] | None = None,
     rules: Rules = Rules(),
     intervention_penalty: float = 0.0,
     config: dict | None = None,
     threads: int = 1,
     autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
+    entry: str = "cautious",
+    intent: str = "any",
+    waiting: str = "line",
+    examine: str = "table",
 ) -> VectorEnv:
     """Environments side by side, each with a shield around its ego.
 
@@ -37,7 +42,7 @@ def make_vec(
       num_envs: how many.
       shield: "override", "monitor", or None for bare environments.
       backend: "fast", the compiled engine, or "highway-env", the original one after the other.
-      params, rules, intervention_penalty: see `ShieldWrapper`.
+      params, rules, intervention_penalty, entry, intent, waiting, examine: see `ShieldWrapper`.
       config: as for `gymnasium.make` of a highway-env environment.
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`.
@@ -55,14 +60,19 @@ def make_vec(
     if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
         raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
     if backend == "highway-env":
-        options = dict(params=params, rules=rules, intervention_penalty=intervention_penalty, config=config)
+        options: dict[str, Any] = dict(
+            params=params, rules=rules, intervention_penalty=intervention_penalty, config=config
+        )
+        options |= dict(entry=entry, intent=intent, waiting=waiting, examine=examine)
         one = partial(_make_counted, env_id, shield, options)
         return SyncVectorEnv([one] * num_envs, autoreset_mode=autoreset_mode)
     scenario = compile_scenario(env_id, config)
     settings = None
     if shield is not None:
-        check_environment(scenario.stock)
-        settings = settings_for(check_params(params), rules, shield, 1 / scenario.stock.config["simulation_frequency"])
+        stock = scenario.stock
+        check_environment(stock)
+        conduct = check_conduct(entry, intent, waiting, examine)
+        settings = settings_for(stock, check_params(params, stock), rules, shield, conduct)
     return FastVectorEnv(scenario, num_envs, settings, intervention_penalty, autoreset_mode, threads)
 
 

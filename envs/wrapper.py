@@ -5,20 +5,36 @@ from typing import Any
 
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
-from highway_env.envs.common.action import ContinuousAction, DiscreteMetaAction
+from highway_env.envs.common.action import ContinuousAction, DiscreteMetaAction, MultiAgentAction
 from highway_env.envs.exit_env import ExitEnv
 from highway_env.envs.highway_env import HighwayEnv
+from highway_env.envs.intersection_env import IntersectionEnv
 from highway_env.envs.merge_env import MergeEnv
+from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
+from highway_env.envs.u_turn_env import UTurnEnv
 
-from envs.highway import Frame, Settings, ShieldedEgo, StepTally, log_of, response_name
+from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo, log_of
+from envs.shielding import attach, begin_step, end_step, info_of
+from envs.traffic import TRAFFIC, shield_everybody
 from shield.blame import Audit, audit
+from shield.examined import EXAMINED
+from shield.junction import ENTRIES
 from shield.kinematics import frames_for
 from shield.params import PRESETS, Preset, RSSParams, Rules
+from shield.plans import INTENTS
 
 MODES = ("override", "monitor")
-SUPPORTED = "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1"
-LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
+WAITING = ("line", "anywhere")
+SUPPORTED = (
+    "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
+    "roundabout-generic-v0, intersection-v0/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
+)
+_SCHEMES = {
+    **dict.fromkeys((HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv, UTurnEnv), LANES),
+    RoundaboutEnv: PLANS,
+    IntersectionEnv: PLANS,
+}
 
 
 class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
@@ -36,7 +52,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         `steering_change` [rad] (largest), `dangerous`, `dangerous_pairs` and `broken_duties`
         (pair-frames), and for the pair nearest to danger `partner` (index in `road.vehicles`,
         static objects after them, -1 = nobody), `min_margin_lon`, `min_margin_lat` (gap minus
-        required gap [m], inf = nobody); `response`: "none", "longitudinal", "lateral" or "both".
+        required gap [m], inf = nobody); `response`: "none", "longitudinal", "lateral", "both", or "go": on
+        through a junction.
       cost: 1.0 if the ego broke its proper response in this step or a contact was its fault.
       blame: "" before a contact, then "ego", "other", "both", "inherited", or "none" (a bug).
       blame_evidence: {} or partner, kind of danger, seconds since its threshold, duties broken and
@@ -44,14 +61,29 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
       override_share, episode_cost, episode_dangerous_pairs, episode_broken_duties, min_ttc: since
         reset; min_ttc [s] is at most 100.
       raw_reward: the environment's own reward (after a step).
+      time: since reset [s].
+      is_success: has the ego reached its goal? Only where there is one: past an intersection, on the exit
+        (after a step).
+      traffic_blame: with compliant traffic, the verdicts of all other cars that have had a contact, each from its
+        own view.
 
     Args:
       env: a highway-env environment with one controlled vehicle; see `SUPPORTED`.
       mode: "override" or "monitor".
-      params: `Preset`, or a pair of `RSSParams` (ego, other).
+      params: `Preset`, a pair of `RSSParams` (ego, other), or None: "intersection" at intersections,
+        "simulator" elsewhere.
       intervention_penalty: subtracted from the reward, times the step's `override_fraction`.
       rules: which duties and margins are in force, for ablations.
       record: keep every frame of the episode in `frames`, for `audit`.
+      entry: whom the ego expects to give way at a junction: "cautious" nobody, "priority" who must
+        and still can, "assertive" everybody who still can (Def. 17 as printed).
+      intent: which routes it expects of others: "known" (V2X), "straight", or "any" that fits.
+      waiting: where it may wait: at the "line", in nobody's way whoever may come, or "anywhere" in
+        the junction that is in the way of nobody who is there.
+      examine: against whom it checks its plans through a junction: "table" whose ways meet its own, "all"
+        everybody, for the same commands; "geofence", "walk", "first-conflicting" and "first" may miss
+        somebody (`shield.examined`).
+      traffic: "stock", or "compliant": every other car has a shield of its own, in every mode.
 
     Raises:
       ValueError: unsupported environment, action type or mode; bad parameters; a response time
@@ -62,25 +94,39 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         self,
         env: gym.Env,
         mode: str = "override",
-        params: Preset | tuple[RSSParams, RSSParams] = PRESETS["simulator"],
+        params: Preset | tuple[RSSParams, RSSParams] | None = None,
         intervention_penalty: float = 0.0,
         rules: Rules = Rules(),
         record: bool = False,
+        entry: str = "cautious",
+        intent: str = "any",
+        waiting: str = "line",
+        traffic: str = "stock",
+        examine: str = "table",
     ) -> None:
         RecordConstructorArgs.__init__(
-            self, mode=mode, params=params, intervention_penalty=intervention_penalty, rules=rules, record=record
+            self,
+            mode=mode,
+            params=params,
+            intervention_penalty=intervention_penalty,
+            rules=rules,
+            record=record,
+            entry=entry,
+            intent=intent,
+            waiting=waiting,
+            traffic=traffic,
+            examine=examine,
         )
         gym.Wrapper.__init__(self, env)
-        if mode not in MODES:
-            raise ValueError(f"mode = {mode!r}: expected one of {', '.join(MODES)}")
-        if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
-            raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
+        check_options(mode, intervention_penalty, traffic)
         check_environment(env.unwrapped)
         self.mode = mode
-        self.params = check_params(params)
+        self.params = check_params(params, env.unwrapped)
+        self.conduct = check_conduct(entry, intent, waiting, examine)
         self.rules = rules
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
+        self.traffic = traffic
         self._attach()
 
     @property
@@ -104,68 +150,79 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         """The parameter table in force, response times rounded up to whole frames."""
         return self._ego.settings
 
+    @property
+    def drivers(self) -> list[ShieldedEgo]:
+        """Shields of the other cars, in compliant traffic."""
+        return self._drivers
+
     def reset(self, *, seed=None, options=None):
         observation, info = self.env.reset(seed=seed, options=options)
-        check_environment(self.env.unwrapped)
+        env: Any = self.env.unwrapped
+        check_environment(env)
         self._attach()
-        info.update(self._info(StepTally(), cost=0.0))
+        info.update(info_of(self._ego), time=float(env.time), **traffic_info(self))
         return observation, info
 
     def step(self, action):
-        ego = self._ego
-        ego.tally = tally = StepTally()
-        had_contact = ego.contact is not None
+        self._welcome()
+        had_contact = begin_step(self._ego)
         observation, reward, terminated, truncated, info = self.env.step(action)
-        ego.check_contact()
-        at_fault = not had_contact and ego.contact is not None and ego.contact["verdict"] in ("ego", "both")
-        cost = 1.0 if tally.broken_duties or at_fault else 0.0
-        ego.cost += cost
-        info.update(self._info(tally, cost=cost))
-        info["shield"]["proposed_action"] = action
-        info["raw_reward"] = reward
+        info.update(end_step(self._ego, had_contact, action), **traffic_info(self))
+        env: Any = self.env.unwrapped
+        info.update(time=float(env.time), raw_reward=reward)
+        if isinstance(env, IntersectionEnv):
+            info["is_success"] = bool(env.has_arrived(env.vehicle))
         reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
         return observation, reward, terminated, truncated, info
 
     def _attach(self) -> None:
         env: Any = self.env.unwrapped
-        settings = settings_for(self.params, self.rules, self.mode, 1 / env.config["simulation_frequency"])
-        self._ego = ShieldedEgo(env.vehicle, settings, self.record)
+        settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
+        self._ego = attach(env.vehicle, settings, self.record)
+        self._drivers: list[ShieldedEgo] = []
+        self._welcome()
 
-    def _info(self, tally: StepTally, cost: float) -> dict:
-        ego = self._ego
-        frames = max(tally.frames, 1)
-        return {
-            "shield": {
-                "intervened": tally.overridden > 0,
-                "override_fraction": tally.overridden / frames,
-                "limited_fraction": tally.limited / frames,
-                "acceleration_change": tally.acceleration_change,
-                "steering_change": tally.steering_change,
-                "dangerous": tally.dangerous_pairs > 0,
-                "dangerous_pairs": tally.dangerous_pairs,
-                "broken_duties": tally.broken_duties,
-                "min_margin_lon": tally.margin_lon,
-                "min_margin_lat": tally.margin_lat,
-                "partner": tally.partner,
-                "response": response_name(tally.response),
-            },
-            "cost": cost,
-            "blame": ego.contact["verdict"] if ego.contact else "",
-            "blame_evidence": dict(ego.contact) if ego.contact else {},
-            "override_share": ego.frames_overridden / max(ego.frames, 1),
-            "episode_cost": ego.cost,
-            "episode_dangerous_pairs": ego.dangerous_pairs,
-            "episode_broken_duties": ego.broken_duties,
-            "min_ttc": min(ego.min_ttc, LONGEST_TTC),
-        }
+    def _welcome(self) -> None:
+        """Shield the cars that have come since the last step."""
+        if self.traffic == "compliant":
+            env: Any = self.env.unwrapped
+            self._drivers = shield_everybody(env.road, self._drivers, self.settings)
+
+
+def traffic_info(wrapper) -> dict[str, Any]:
+    """What infos say about compliant traffic."""
+    if wrapper.traffic == "stock":
+        return {}
+    contacts = [driver.contact for driver in wrapper.drivers if driver.check_contact()]
+    return {"traffic_blame": tuple(contact["verdict"] for contact in contacts)}
+
+
+def check_options(mode: str, intervention_penalty: float, traffic: str) -> None:
+    if mode not in MODES:
+        raise ValueError(f"mode = {mode!r}: expected one of {', '.join(MODES)}")
+    if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
+        raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
+    if traffic not in TRAFFIC:
+        raise ValueError(f"traffic = {traffic!r}: expected one of {', '.join(TRAFFIC)}")
 
 
 def check_environment(env: Any) -> None:
-    if not isinstance(env, (HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv)):
-        raise ValueError(f"environment {type(env).__name__} is not supported; expected one of {SUPPORTED}")
+    """Can one ego be shielded in an environment?"""
+    check_kind(env)
+    if isinstance(env.action_type, MultiAgentAction):
+        raise ValueError("action type MultiAgentAction is not supported by ShieldWrapper; expected MultiAgentShield")
     if len(env.controlled_vehicles) != 1:
         raise ValueError(f"controlled_vehicles = {len(env.controlled_vehicles)}: expected exactly 1")
-    action_type = env.action_type
+    check_action_type(env.action_type, env)
+
+
+def check_kind(env: Any) -> None:
+    if not isinstance(env, tuple(_SCHEMES)):
+        raise ValueError(f"environment {type(env).__name__} is not supported; expected one of {SUPPORTED}")
+
+
+def check_action_type(action_type: Any, env: Any) -> None:
+    """Can the shield restrict what an agent may do with its car?"""
     if not isinstance(action_type, (DiscreteMetaAction, ContinuousAction)):
         raise ValueError(
             f"action type {type(action_type).__name__} is not supported; "
@@ -173,18 +230,54 @@ def check_environment(env: Any) -> None:
         )
     if getattr(action_type, "dynamical", False):
         raise ValueError("action option dynamical = True is not supported; expected False")
+    if scheme_of(env) != LANES and not isinstance(action_type, DiscreteMetaAction):
+        raise ValueError(
+            f"action type {type(action_type).__name__} is not supported where roads cross, because a car that is "
+            "steered freely may leave the route it has declared; expected DiscreteMetaAction"
+        )
 
 
-def check_params(params) -> Preset:
+def scheme_of(env: Any) -> int:
+    """What keeps the ego safe in an environment: LANES or PLANS."""
+    return next(scheme for kind, scheme in _SCHEMES.items() if isinstance(env, kind))
+
+
+def check_conduct(entry: str, intent: str, waiting: str, examine: str) -> dict[str, Any]:
+    """The fields of `Settings` that say how the ego behaves at junctions."""
+    for name, value, known in (
+        ("entry", entry, ENTRIES),
+        ("intent", intent, INTENTS),
+        ("waiting", waiting, WAITING),
+        ("examine", examine, EXAMINED),
+    ):
+        if value not in known:
+            raise ValueError(f"{name} = {value!r}: expected one of {', '.join(known)}")
+    return {
+        "entry": ENTRIES.index(entry),
+        "intent": INTENTS.index(intent),
+        "waits_anywhere": waiting == "anywhere",
+        "examine": EXAMINED.index(examine),
+    }
+
+
+def default_preset(env: Any) -> str:
+    """Name of the preset that states the limits of an environment's traffic."""
+    return "intersection" if isinstance(env, IntersectionEnv) else "simulator"
+
+
+def check_params(params, env: Any) -> Preset:
+    if params is None:
+        return PRESETS[default_preset(env)]
     if isinstance(params, Preset):
         return params
     if isinstance(params, tuple) and len(params) == 2 and all(isinstance(p, RSSParams) for p in params):
         return Preset(*params, source="given by the user")
-    raise ValueError(f"params = {params!r}: expected a Preset or a pair of RSSParams (ego, other)")
+    raise ValueError(f"params = {params!r}: expected a Preset, a pair of RSSParams (ego, other) or None")
 
 
-def settings_for(params: Preset, rules: Rules, mode: str, dt: float) -> Settings:
-    """The table for frames of `dt` seconds: response times rounded up to whole frames (condition C2)."""
+def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dict[str, Any]) -> Settings:
+    """What a shield on `env` runs with: response times rounded up to whole frames (condition C2)."""
+    dt = 1 / env.config["simulation_frequency"]
     RSSParams.validated(**params.ego._asdict())
     RSSParams.validated(**params.other._asdict())
     rho = params.ego.response_time
@@ -194,4 +287,7 @@ def settings_for(params: Preset, rules: Rules, mode: str, dt: float) -> Settings
         )
     ego = params.ego._replace(response_time=float(frames_for(max(rho, dt), dt) * dt))
     other = params.other._replace(response_time=float(frames_for(params.other.response_time, dt) * dt))
-    return Settings(ego, other, rules, mode == "override", dt)
+    scheme = scheme_of(env)
+    if scheme == PLANS:  # the paths hold everybody's width at any speed, so lateral speeds need no limit
+        rules = rules._replace(limits=False)
+    return Settings(ego, other, rules, mode == "override", dt, scheme, **conduct)

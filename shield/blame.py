@@ -28,6 +28,7 @@ from shield.response import (
     LON,
     MEMORY,
     NEVER,
+    forget,
     forget_safe,
     lateral_speed_limit,
     longitudinal_response,
@@ -38,6 +39,9 @@ from shield.response import (
 )
 
 KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
+LEFT_NO_PLAN, WAVERED, ACCELERATED, BRAKED, LEFT_PATHS, CRASHED, GAVE_NO_WAY, REVERSED, CUT_IN = range(
+    7, 16
+)  # at junctions
 DUTIES = (
     "",
     "got farther along the lane than its share [m]",
@@ -46,6 +50,15 @@ DUTIES = (
     "braked less than the proper response asks [m/s^2]",
     "braked harder than a_max_brake [m/s^2]",
     "moved toward the other across the lane [m/s]",
+    "left itself no way to stay clear [m/s^2]",
+    "neither braked nor went on [m/s^2]",
+    "accelerated harder than a_max_accel [m/s^2]",
+    "braked harder than a_max_brake at a junction [m/s^2]",
+    "left every path it could take",
+    "crashed before",
+    "did not give way",
+    "reversed [m/s]",
+    "cut in in front of the other",
 )
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")
@@ -206,7 +219,7 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
     drift = 0.5 * curvature * ego.speed**2 * dt
     pairs = broken = 0
     for i in range(len(users)):
-        if memory[i].since > 0:
+        if memory[i].since > 0 and not users[i].elsewhere:
             judge_motion(memory[i], ego, users[i], ego_params, other_params, _NOW, 0.0, dt)
             duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
             _blame_ego(memory[i], duty, excess)
@@ -310,6 +323,9 @@ def audit(log, ego_params, other_params, rules, dt):
         drift = 0.5 * log.curvature[t] * ego.speed**2 * dt
         for i in range(count):
             if not log.present[t, i]:
+                continue
+            if log.users[t, i].elsewhere:
+                forget(memory[i])
                 continue
             if log.jumped[t]:
                 forget_safe(memory[i])

@@ -8,7 +8,7 @@ from shield.command import Command
 from shield.compiled import compiled, merged
 from shield.geometry import signed_gap
 from shield.pair import assess, leading_speed, least_margin, own_share, toward
-from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, remember
+from shield.response import Bounds, catch_up, forget, merge, owes_braking, owes_lateral_stop, remember
 
 
 class Report(NamedTuple):
@@ -21,11 +21,11 @@ class Report(NamedTuple):
     partner: int  # index of the road user nearest to danger, -1 if alone
     margin_lon: float  # of that pair [m]; inf if alone
     margin_lat: float
-    response: int  # sum of RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN
+    response: int  # sum of RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN, RESPONSE_GO
     ttc: float  # time to collision with a car ahead in the way of the ego [s]; inf if none
 
 
-RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN = 1, 2, 4
+RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN, RESPONSE_GO = 1, 2, 4, 8  # GO: on through a junction
 
 _FAR = 1e-6  # a pair that is safe by more than this is far apart: more than rounding can change [m]
 _STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
@@ -71,6 +71,9 @@ def shield_frame(ego, users, ego_before, users_before, memory, nominal, body, eg
     dangerous, response = False, 0
     share_ego = own_share(ego, ego_params, dt)
     for i in range(len(users)):
+        if users[i].elsewhere:
+            forget(memory[i])
+            continue
         margin = least_margin(ego, users[i], share_ego, ego_params, other_params, rules, dt)
         if memory[i].since == 0 and margin > max(worst, _FAR) and not _may_be_next(ego, users[i], ttc, rules):
             memory[i].skipped = True

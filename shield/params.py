@@ -104,10 +104,10 @@ def _slides(**changes: float) -> RSSParams:
     return RSSParams.validated(**(fields | changes))
 
 
-def _simulator(response_time: float) -> RSSParams:
+def _simulator(response_time: float, a_max_accel: float = 3.0) -> RSSParams:
     return RSSParams.validated(
         response_time=response_time,
-        a_max_accel=3.0,
+        a_max_accel=a_max_accel,
         a_min_brake=5.0,
         a_max_brake=6.0,
         a_min_brake_correct=3.0,
@@ -128,6 +128,12 @@ PRESETS: dict[str, Preset] = {
         ego=_simulator(response_time=2 / 15),
         other=_simulator(response_time=1.0),
         source="limits of highway-env (IDM brakes at 6 m/s^2 at most); the ego reacts within two frames at 15 Hz",
+        per_frame=True,
+    ),
+    "intersection": Preset(
+        ego=_simulator(response_time=2 / 15, a_max_accel=6.0),
+        other=_simulator(response_time=1.0, a_max_accel=6.0),
+        source="as simulator, but at highway-env's intersections IDM accelerates at up to 6 m/s^2",
         per_frame=True,
     ),
     "slides": Preset(

@@ -86,6 +86,7 @@ def test_the_car_in_its_own_lane_is_not_asked_to_brake_harder_than_the_others():
 # acceleration and braking, mu, standstill gap, speed cap: as printed in each preset's source
 PUBLISHED = {
     "simulator": (2 / 15, 1.0, 3.0, 5.0, 6.0, 3.0, 1.0, 1.5, 0.1, 1.0, 40.0),
+    "intersection": (2 / 15, 1.0, 6.0, 5.0, 6.0, 3.0, 1.0, 1.5, 0.1, 1.0, 40.0),
     "slides": (1.0, 2.0, 3.5, 4.0, 8.0, 4.0, 0.2, 0.8, 0.1, 1.0, math.inf),
     "ad-rss": (1.0, 2.0, 3.5, 4.0, 8.0, 3.0, 0.2, 0.8, 0.1, 0.0, 100.0),
     "carla": (0.5, 0.5, 5.0, 4.0, 8.0, 3.0, 0.2, 0.8, 0.1, 0.0, 100.0),
@@ -109,8 +110,8 @@ def test_presets_pass_their_own_validation_and_name_their_source(name):
     assert preset.source
 
 
-def test_only_the_simulator_preset_reacts_as_fast_as_the_simulator_allows():
-    assert [name for name, preset in PRESETS.items() if preset.per_frame] == ["simulator"]
+def test_only_the_presets_of_the_simulator_react_as_fast_as_it_allows():
+    assert [name for name, preset in PRESETS.items() if preset.per_frame] == ["simulator", "intersection"]
 
 
 def test_every_rule_of_the_proof_is_in_force_by_default():

@@ -171,11 +171,19 @@ def test_an_agent_that_drives_into_the_car_ahead_is_blamed_with_evidence():
     [
         ({"shield": "mask"}, r"shield = 'mask': expected 'override', 'monitor' or None"),
         ({"env_id": "nowhere-v0"}, r"env_id = 'nowhere-v0'"),
-        ({"env_id": "intersection-v0"}, r"IntersectionEnv is not supported; expected one of highway-v0"),
+        ({"env_id": "racetrack-v0"}, r"RacetrackEnv is not supported; expected one of highway-v0"),
+        ({"env_id": "intersection-v1"}, r"dynamical = True is not supported"),
+        (
+            {"env_id": "intersection-v0", "config": {"action": {"type": "ContinuousAction"}}},
+            r"ContinuousAction is not supported where roads cross",
+        ),
+        ({"entry": "bold"}, r"entry = 'bold': expected one of cautious, priority, assertive"),
+        ({"intent": "none"}, r"intent = 'none': expected one of known, straight, any"),
+        ({"waiting": "inside"}, r"waiting = 'inside': expected one of line, anywhere"),
         ({"config": {"controlled_vehicles": 2}}, r"controlled_vehicles = 2: expected exactly 1"),
         ({"config": {"action": {"type": "ContinuousAction", "dynamical": True}}}, r"dynamical = True"),
         ({"intervention_penalty": -1.0}, r"intervention_penalty = -1.0: expected a finite number >= 0"),
-        ({"params": PRESETS["simulator"].ego}, r"expected a Preset or a pair of RSSParams"),
+        ({"params": PRESETS["simulator"].ego}, r"expected a Preset, a pair of RSSParams"),
     ],
 )
 def test_bad_input_is_named_with_its_range(arguments, message):

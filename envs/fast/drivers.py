@@ -7,18 +7,15 @@ import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.fast.compiled import compiled, merged
-from envs.fast.floats import clip, dot, not_zero, wrap_to_pi
-from envs.fast.network import distance, heading_at, is_after_end, is_reachable, local_coordinates, position
+from envs.fast.floats import clip, dot, not_zero
+from envs.fast.network import distance, is_after_end, is_reachable, local_coordinates, position
 from envs.fast.sight import car_ahead, car_behind, locate
 from envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
+from envs.fast.steering import steering_angle
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)  # as in `DiscreteMetaAction.ACTIONS_ALL`
 
-_PURSUIT = ControlledVehicle.TAU_PURSUIT  # [s]
 _KP_ACCELERATION = ControlledVehicle.KP_A  # [1/s]
-_KP_HEADING = ControlledVehicle.KP_HEADING
-_KP_LATERAL = ControlledVehicle.KP_LATERAL
-_MAX_STEERING = ControlledVehicle.MAX_STEERING_ANGLE  # [rad]
 
 
 @compiled
@@ -92,16 +89,8 @@ def control(cars, i, net, lanes, sight):
 @merged
 def steer(cars, i, lanes, sight):
     """Steering angle that leads the car to the middle of its target lane [rad]."""
-    car = cars[i]
-    lane, s, lateral = lanes[car.target_lane], sight.s[car.target_lane, i], sight.lateral[car.target_lane, i]
-    heading = heading_at(lane, s + car.speed * _PURSUIT)
-    if lateral == 0.0 and heading == car.heading:
-        return 0.0
-    speed = not_zero(car.speed)
-    heading += clip(np.arcsin(clip(-_KP_LATERAL * lateral / speed, -1.0, 1.0)), -np.pi / 4, np.pi / 4)
-    rate = _KP_HEADING * wrap_to_pi(heading - car.heading)
-    slip = np.arcsin(clip(car.length / 2 / speed * rate, -1.0, 1.0))
-    return clip(np.arctan(2 * np.tan(slip)), -_MAX_STEERING, _MAX_STEERING)
+    car, k = cars[i], cars[i].target_lane
+    return steering_angle(lanes[k], sight.s[k, i], sight.lateral[k, i], car.heading, car.speed, car.length)
 
 
 # ---------------------------------------------------------------- routes

@@ -22,11 +22,13 @@ from envs.fast.guard import (
     OVERRIDE,
     Frames,
     Past,
+    carry_over,
     check_contact,
     compile_frames,
     is_at_fault,
     make_watch,
     no_frames,
+    refuse_lane_change,
     start_tally,
     start_watch,
     watch_frame,
@@ -39,6 +41,7 @@ from envs.fast.sight import make_sight, sort_along_x
 from envs.fast.state import CAR, EPISODE, STEP
 from envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from envs.highway import Settings
+from shield.junction import CROSSING
 from shield.pair import ROAD_USER
 from shield.params import PRESETS, Rules
 from shield.response import MEMORY
@@ -71,6 +74,7 @@ class Batch(NamedTuple):
     episodes: np.ndarray  # `[E]` EPISODE
     order: np.ndarray  # `[E, N]` indices sorted by x
     memory: np.ndarray  # `[E, N]` MEMORY of the shield, `[E, 0]` without one
+    crossings: np.ndarray  # `[E, N]` see `guard.Past`
     before: np.ndarray  # `[E, N, 2]` see `guard.Past`
     seen: np.ndarray  # `[E, 2, N]`
 
@@ -141,7 +145,7 @@ def _see(cars, episode, world, sight, out):
 def _report(cars, episode, mode, cost, step):
     """Fill in what every step says."""
     ego = cars[episode.ego]
-    step.speed, step.crashed = ego.speed, ego.crashed
+    step.speed, step.crashed, step.time = ego.speed, ego.crashed, episode.time
     step.episode_return, step.episode_length = episode.return_, episode.steps
     if mode != OFF:
         episode.cost += cost
@@ -169,7 +173,10 @@ def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode,
         if frame == 0:
             if config.meta_actions:
                 label = world.labels[inputs.actions[e]]
+                before = ego.target_lane
                 take_meta_action(cars, episode.ego, label, net, lanes, sight, world.target_speeds)
+                if mode != OFF:
+                    refuse_lane_change(before, cars, episode, past, sight, world.frames, settings)
             else:
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
@@ -196,7 +203,8 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
     config, lanes = world.config[0], world.network.lanes
     for e in range(first, last):
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
-        past, observation = Past(batch.memory[e], batch.before[e], batch.seen[e]), outputs.observations[e]
+        past = Past(batch.memory[e], batch.crossings[e], batch.before[e], batch.seen[e])
+        observation = outputs.observations[e]
         outputs.rewards[e] = 0.0
         outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
@@ -219,7 +227,10 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
         episode.ended = outputs.terminated[e] or outputs.truncated[e]
         _report(cars, episode, mode, cost, step)
         if config.scenario == INTERSECTION:
+            was_ego = episode.ego
             let_traffic_flow(cars, episode, order, world.network, config)
+            if mode != OFF:
+                carry_over(episode, cars, past, was_ego, watch)
         if episode.ended and autoreset == SAME_STEP:
             for k in range(len(observation)):
                 outputs.final_observations[e, k] = observation[k]
@@ -259,7 +270,7 @@ class Engine:
         self.world = World(
             scenario.config,
             scenario.network,
-            compile_frames(scenario.stock.road.network) if settings else no_frames(),
+            compile_frames(scenario.stock.road.network, scenario.network, settings.scheme) if settings else no_frames(),
             scenario.target_speeds,
             scenario.labels,
             scenario.features,
@@ -272,6 +283,7 @@ class Engine:
             np.zeros(num_envs, EPISODE),
             np.zeros((num_envs, n), np.int64),
             np.zeros((num_envs, watched), MEMORY),
+            np.zeros((num_envs, watched), CROSSING),
             np.zeros((num_envs, watched, 2)),
             np.zeros((num_envs, 2, watched), ROAD_USER),
         )

@@ -11,17 +11,22 @@ import numpy as np
 from envs.fast.collisions import is_near, overlap
 from envs.fast.compiled import compiled, unfolded
 from envs.fast.floats import norm
-from envs.fast.network import heading_at
-from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, OBSTACLE, OBSTACLE_SIZE
-from envs.highway import road_through
+from envs.fast.network import Network, heading_at
+from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
+from envs.highway import LANES, PLANS, road_through
+from envs.intent import Junction, Roads, list_threats, no_roads, track_of
+from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
 from shield.command import Command
 from shield.controller import Body, shield_frame
 from shield.geometry import PIECE_FIELDS, largest_half_extents
+from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame, no_report
 from shield.lane_frame import same_frame, to_lane_frame
+from shield.plans import Scene
 from shield.response import MEMORY, catch_up, forget_safe
 
 OFF, MONITOR, OVERRIDE = range(3)
+_PLANS = 4  # kinds of danger from here on are plans, in `infos`
 
 
 class Frames(NamedTuple):
@@ -30,12 +35,15 @@ class Frames(NamedTuple):
     pieces: np.ndarray  # `[P, 8]` pieces of the roads through all lanes
     start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
     same: np.ndarray  # `[L, L]` no gap jumps between the two frames
+    roads: Roads  # paths through junctions
+    choice: np.ndarray  # `[R + 1, L]` row of the paths of a driver with route R who heads for lane L; last: no route
 
 
 class Past(NamedTuple):
-    """What the shield remembers of one environment with N road users, the ego last."""
+    """What the shield remembers of one environment with room for N road users, the ego in the last row."""
 
     memory: np.ndarray  # `[N]` MEMORY
+    crossings: np.ndarray  # `[N]` CROSSING
     before: np.ndarray  # `[N, 2]` positions one frame ago, nan at first sight [m]
     seen: np.ndarray  # `[2, N]` ROAD_USER of the last two frames; `episode.turn` is the row of the last one
 
@@ -45,21 +53,42 @@ class Watch(NamedTuple):
 
     boxes: np.ndarray  # `[2, 4]` length, width, largest half extents of a car and of an obstacle [m]
     blank: np.ndarray  # `[1]` MEMORY of a first sight
+    blank_crossing: np.ndarray  # `[1]` CROSSING likewise
 
 
-def compile_frames(network) -> Frames:
-    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`."""
-    roads = [road_through(network, index) for index in network.lanes_dict()]
+def compile_frames(network, net: Network, scheme: int) -> Frames:
+    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`, and the paths through its junctions.
+
+    Args:
+      network: the road network, net: the same as arrays.
+      scheme: what keeps the ego safe, as in `Settings`.
+    """
+    indices = list(network.lanes_dict())
+    lanes = [road_through(network, index) for index in indices]
+    roads, choice = no_roads(), np.zeros((1, 0), np.int64)
+    if scheme != LANES:
+        junction = junction_of(network)
+        choice = _choices(junction, network, net)
+        roads = junction.roads
     return Frames(
-        np.concatenate(roads),
-        np.cumsum([0, *map(len, roads)]),
-        np.array([[same_frame(a, b) for b in roads] for a in roads]),
+        np.concatenate(lanes),
+        np.cumsum([0, *map(len, lanes)]),
+        np.array([[same_frame(a, b) for b in lanes] for a in lanes]),
+        roads,
+        choice,
     )
+
+
+def _choices(junction: Junction, network, net: Network) -> np.ndarray:
+    ways = [(origin, end) for origin, ends in network.graph.items() for end in ends]
+    routes = [[ways[road] for road in roads if road >= 0] for roads in net.route_roads]
+    return np.array([[junction.choice(index, route) for index in network.lanes_dict()] for route in [*routes, []]])
 
 
 def no_frames() -> Frames:
     """Stands in where no shield runs."""
-    return Frames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), np.zeros((0, 0), bool))
+    none = np.zeros((0, 0), bool)
+    return Frames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), none, no_roads(), np.zeros((1, 0), np.int64))
 
 
 def make_watch(heading_bound):
@@ -68,7 +97,7 @@ def make_watch(heading_bound):
     boxes[0, 0], boxes[0, 1] = CAR_LENGTH, CAR_WIDTH
     boxes[0, 2], boxes[0, 3] = largest_half_extents(CAR_LENGTH, CAR_WIDTH, heading_bound)
     boxes[1, 0], boxes[1, 1] = OBSTACLE_SIZE, OBSTACLE_SIZE
-    return Watch(boxes, np.zeros(1, MEMORY))
+    return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING))
 
 
 @compiled
@@ -76,8 +105,11 @@ def start_watch(episode, past, watch):
     """Forget everything at the start of an episode."""
     for i in range(len(past.memory)):
         past.memory[i] = watch.blank[0]
+        past.crossings[i] = watch.blank_crossing[0]
         past.before[i, 0] = past.before[i, 1] = np.nan
-    episode.frame_lane, episode.turn = -1, 0
+    episode.frame_lane, episode.turn, episode.go, episode.frames_trapped = -1, 0, -1, 0
+    episode.path = -1
+    episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     episode.frames = episode.frames_overridden = 0
     episode.dangerous_pairs = episode.broken_duties = 0
@@ -86,6 +118,27 @@ def start_watch(episode, past, watch):
     episode.blame = episode.blame_axes = episode.blame_frames = episode.ego_duty = episode.other_duty = 0
     episode.blame_partner = -1
     episode.ego_excess = episode.other_excess = 0.0
+
+
+@compiled
+def carry_over(episode, cars, past, ego, watch):
+    """Cars came and went: everybody's past moves along.
+
+    Args:
+      ego: index of the ego before.
+    """
+    for i in range(len(past.memory) - 1):
+        k = _car_of(i, episode)
+        was = cars[k].was if k < episode.cars else -1
+        if was < 0:
+            past.memory[i] = watch.blank[0]
+            past.crossings[i] = watch.blank_crossing[0]
+            past.before[i, 0] = past.before[i, 1] = np.nan
+            continue
+        j = was if was < ego else was - 1  # never less than i: those after a gap move up
+        past.memory[i], past.crossings[i] = past.memory[j], past.crossings[j]
+        past.before[i, 0], past.before[i, 1] = past.before[j, 0], past.before[j, 1]
+        past.seen[0, i], past.seen[1, i] = past.seen[0, j], past.seen[1, j]
 
 
 @compiled
@@ -120,18 +173,22 @@ def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step
     else:
         acceleration, steering = car.acceleration, car.steering
     curvature = _sense(cars, episode, past, lanes, sight, frames, watch, settings)
-    n = episode.cars - 1
+    n, last = episode.cars - 1, len(past.memory) - 1
     now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
-    ego, users, memory = now[n], now[:n], past.memory[:n]
+    ego, users, memory = now[last], now[:n], past.memory[:n]
     wish = Command(acceleration, np.arctan(0.5 * np.tan(steering)))
+    granted, plans = wish, no_report(wish.acceleration)
+    if settings.scheme != LANES:
+        plans = _plan(cars, episode, past, sight, frames, settings, acceleration)
+        granted = Command(plans.acceleration if settings.overrides else wish.acceleration, wish.slip)
     max_slip = np.arctan(np.tan(np.pi / 3) / 2)
     report = shield_frame(
         ego,
         users,
-        then[n],
+        then[last],
         then[:n],
         memory,
-        wish,
+        granted,
         Body(car.length / 2, max_slip, curvature),
         settings.ego,
         settings.other,
@@ -146,9 +203,12 @@ def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step
     if settings.overrides:
         car.acceleration, car.steering = command.acceleration, steered
 
+    pairs, broken = pairs + plans.pairs, broken + plans.broken
+    overridden = (report.overridden or plans.overridden or episode.refused) and settings.overrides
+    episode.refused = False
     step.frames += 1
-    step.overridden += report.overridden and settings.overrides
-    step.limited += report.limited and settings.overrides
+    step.overridden += overridden
+    step.limited += (report.limited or plans.limited) and not overridden and settings.overrides
     step.dangerous_pairs += pairs
     step.broken_duties += broken
     step.acceleration_change = max(step.acceleration_change, abs(command.acceleration - acceleration))
@@ -156,12 +216,92 @@ def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step
     if max(report.margin_lon, report.margin_lat) < max(step.margin_lon, step.margin_lat):
         step.margin_lon, step.margin_lat = report.margin_lon, report.margin_lat
         step.partner = _car_of(report.partner, episode)
-    step.response |= report.response
+    step.response |= report.response | plans.response
     episode.dangerous_pairs += pairs
     episode.broken_duties += broken
     episode.frames += 1
-    episode.frames_overridden += report.overridden and settings.overrides
-    episode.min_ttc = min(episode.min_ttc, report.ttc)
+    episode.frames_overridden += overridden
+    episode.frames_trapped += plans.trapped
+    episode.pairs_examined += plans.examined
+    episode.pairs_possible += plans.possible
+    episode.min_ttc = min(episode.min_ttc, report.ttc, plans.ttc)
+
+
+@compiled
+def refuse_lane_change(before, cars, episode, past, sight, frames, settings):
+    """Take back a lane change of this decision that leaves no plan; `before` is the lane the ego headed for."""
+    ego = cars[episode.ego]
+    episode.refused = False
+    if settings.scheme != PLANS or not settings.overrides or episode.blame != 0 or ego.kind != META:
+        return
+    lanes = frames.roads.lanes
+    if ego.target_lane == before or lanes[ego.target_lane].road != lanes[before].road:
+        return
+    n, path = episode.cars - 1, episode.path
+    track, count = _look(cars, episode, sight, frames, settings)
+    scene = Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt)
+    if not has_plan(scene, past.crossings[:n], settings.entry, not settings.waits_anywhere):
+        ego.target_lane, episode.path = before, path
+        episode.refused = True
+
+
+@compiled
+def _plan(cars, episode, past, sight, frames, settings, acceleration):
+    """The plan through the junction ahead."""
+    n = episode.cars - 1
+    track, count = _look(cars, episode, sight, frames, settings)
+    scene = Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt)
+    return junction_frame(
+        scene,
+        sight.samples[:n],
+        past.crossings[:n],
+        episode,
+        acceleration,
+        settings.entry,
+        not settings.waits_anywhere,
+        settings.examine,
+        settings.overrides,
+    )
+
+
+@compiled
+def _look(cars, episode, sight, frames, settings):
+    """The ego's track, and how many ways the others may take."""
+    n = episode.cars - 1
+    for i in range(n):
+        _describe(cars[_car_of(i, episode)], frames, sight.on_road[i])
+    _describe(cars[episode.ego], frames, sight.on_road[n])
+    track = track_of(frames.roads, sight.on_road[n], episode.path)
+    episode.path = track.path
+    count = list_threats(
+        frames.roads,
+        track,
+        sight.on_road[:n],
+        settings.intent,
+        settings.other.v_cap,
+        sight.samples,
+        sight.threats,
+        sight.box,
+    )
+    if count > len(sight.threats):
+        episode.overflow = True
+    return track, min(count, len(sight.threats))
+
+
+@compiled
+def _describe(car, frames, out):
+    out.x, out.y, out.heading, out.speed, out.length, out.width = (
+        car.x,
+        car.y,
+        car.heading,
+        car.speed,
+        car.length,
+        car.width,
+    )
+    out.wreck = car.crashed or car.kind == OBSTACLE
+    out.on, out.lane, out.choice = car.lane, -1, -1
+    if car.kind == TRAFFIC or car.kind == META:
+        out.lane, out.choice = car.target_lane, frames.choice[car.route, car.target_lane]
 
 
 @compiled
@@ -183,8 +323,9 @@ def _sense(cars, episode, past, lanes, sight, frames, watch, settings):
         episode.frame_lane = ego.lane
     road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
     curvature = 0.0
-    for i in range(n):
-        k = episode.ego if i == n - 1 else _car_of(i, episode)
+    for row in range(n):
+        is_ego = row == n - 1
+        k, i = (episode.ego, len(users) - 1) if is_ego else (_car_of(row, episode), row)
         car, user = cars[k], users[i]
         box = watch.boxes[1 if car.kind == OBSTACLE else 0]
         curvature = to_lane_frame(
@@ -201,7 +342,8 @@ def _sense(cars, episode, past, lanes, sight, frames, watch, settings):
             settings.dt,
             user,
         )
-        user.wreck = k != episode.ego and (car.crashed or car.kind == OBSTACLE)
+        user.wreck = not is_ego and (car.crashed or car.kind == OBSTACLE)
+        user.elsewhere = settings.scheme == PLANS and not is_ego
         user.in_own_lane = _in_own_lane(k, car, ego, lanes, sight)
         before[i, 0], before[i, 1] = car.x, car.y
     return curvature  # of the lane at the ego, the last one
@@ -229,8 +371,10 @@ def check_contact(cars, episode, past, lanes, sight, frames, watch, settings):
 @compiled
 def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
     _sense(cars, episode, past, lanes, sight, frames, watch, settings)
-    n = episode.cars - 1
+    n, last = episode.cars - 1, len(past.memory) - 1
     now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
+    if settings.scheme != LANES:
+        _look(cars, episode, sight, frames, settings)
     heaviest, touched = -1, False
     for i in range(n):
         touched |= _touches(cars, _car_of(i, episode), episode.ego, sight, settings.dt)
@@ -239,14 +383,19 @@ def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
         k = _car_of(i, episode)
         if not (_touches(cars, k, episode.ego, sight, settings.dt) if touched else k == nearest):
             continue
-        memory = past.memory[i]
-        catch_up(memory, then[n], then[i], settings.ego, settings.other, settings.rules, settings.dt)
-        verdict = judge_contact(now[n], now[i], memory, settings.ego, settings.other, settings.rules, settings.dt)
+        if now[i].elsewhere:
+            verdict = judge_crossing(sight.samples[i], past.crossings[i], settings.other, settings.dt)
+        else:
+            memory = past.memory[i]
+            catch_up(memory, then[last], then[i], settings.ego, settings.other, settings.rules, settings.dt)
+            verdict = judge_contact(
+                now[last], now[i], memory, settings.ego, settings.other, settings.rules, settings.dt
+            )
         weight = _weight(verdict.verdict)
         if weight > heaviest:
             heaviest = weight
             episode.blame, episode.blame_partner = 1 + verdict.verdict, k
-            episode.blame_axes, episode.blame_frames = verdict.axes, verdict.frames
+            episode.blame_axes, episode.blame_frames = verdict.axes + _PLANS * now[i].elsewhere, verdict.frames
             episode.ego_duty, episode.ego_excess = verdict.ego_duty, verdict.ego_excess
             episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
 

@@ -6,14 +6,15 @@ nobody asks about.
 
 import numpy as np
 
-from envs.fast.config import EXIT, Scenario
+from envs.fast.config import EXIT, INTERSECTION, Scenario
 from envs.highway import AXES, Settings, response_name
+from envs.junction_ego import PLAN_NAMES
 from shield.blame import DUTIES, VERDICTS
 
 _BLAMES = np.array(["", *VERDICTS])
 _DUTIES = np.array(DUTIES)
-_RESPONSES = np.array([response_name(sum_of_bits) for sum_of_bits in range(8)])
-_AXES = np.array([AXES[axes] for axes in range(len(AXES))])
+_RESPONSES = np.array([response_name(sum_of_bits) for sum_of_bits in range(16)])
+_AXES = np.array([*(AXES[axes] for axes in range(len(AXES))), *(PLAN_NAMES[kind] for kind in range(len(PLAN_NAMES)))])
 
 
 def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None) -> dict:
@@ -33,7 +34,8 @@ def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None)
         "crashed": steps["crashed"],
         "rewards": {name: steps[f"reward_{k}"] for k, name in enumerate(scenario.reward_names)},
     }
-    if scenario.config["scenario"][0] == EXIT:
+    kind = scenario.config["scenario"][0]
+    if kind == EXIT or (kind == INTERSECTION and settings is not None):  # a bare intersection does not say it
         infos["is_success"] = steps["success"]
     if settings is not None:
         infos |= _shield_infos(steps, settings)
@@ -57,6 +59,7 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
             "partner": steps["partner"],
             "response": _RESPONSES[steps["response"]],
         },
+        "time": steps["time"],
         "cost": steps["cost"],
         "blame": _BLAMES[steps["blame"]],
         "blame_evidence": {

@@ -73,6 +73,7 @@ def rate(cars, episode, action, lanes, sight, config, step):
         return clip(reward, 0.0, 1.0) if config.normalize_reward else reward
     if config.scenario == INTERSECTION:
         arrived = has_arrived(cars, episode.ego, lanes, sight)
+        step.success = arrived
         step.reward_1 = clip(_scaled(ego.speed, config), 0.0, 1.0)
         step.reward_2 = 1.0 if arrived else 0.0
         step.reward_3 = on_road

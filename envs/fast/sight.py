@@ -15,7 +15,11 @@ from envs.fast.compiled import compiled, merged
 from envs.fast.floats import wrap_to_pi
 from envs.fast.network import SINE, STRAIGHT, distance, heading_at, is_on_lane, local_coordinates
 from envs.fast.state import CAR
+from envs.intent import CAR_ON_ROAD
+from shield.junction import SAMPLE
+from shield.plans import THREAT
 
+_WAYS = 8  # ways of one road user that there is room for
 MOMENTS = 11  # at which a regulated road looks ahead
 
 
@@ -35,6 +39,10 @@ class Sight(NamedTuple):
     on: np.ndarray  # `[N]` lanes each car may be on, as a set of bits
     futures: np.ndarray  # `[N, MOMENTS + 2, 3]` predicted x, y, heading; then the smallest and the largest
     ghost: np.ndarray  # `[1]` CAR, a copy to predict with
+    on_road: np.ndarray  # `[N]` CAR_ON_ROAD, what the shield reads at junctions
+    samples: np.ndarray  # `[N]` SAMPLE
+    threats: np.ndarray  # `[M]` THREAT, ways that others may take
+    box: np.ndarray  # `[6]` swept box of an obstacle
 
 
 def make_sight(n_lanes, n, speeds, lanes, times):
@@ -53,6 +61,10 @@ def make_sight(n_lanes, n, speeds, lanes, times):
         np.full(n, -1, np.int64),
         np.empty((n, MOMENTS + 2, 3)),
         np.empty(1, CAR),
+        np.zeros(n, CAR_ON_ROAD),
+        np.zeros(n, SAMPLE),
+        np.zeros(_WAYS * n + 64, THREAT),
+        np.zeros(6),
     )
 
 

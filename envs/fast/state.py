@@ -45,6 +45,7 @@ CAR = np.dtype(
         ("checks", "?"),  # looks for collisions itself
         ("changes_lane", "?"),
         ("yields", "?"),  # told to give way at an intersection
+        ("was", "i8"),  # index before cars came and went, -1 = new
     ],
     align=True,
 )
@@ -64,6 +65,12 @@ EPISODE = np.dtype(
         ("overflow", "?"),  # a car found no room in the arrays
         # the shield on the ego
         ("frame_lane", "i8"),  # lane it measures along, -1 = none yet
+        ("path", "i8"),  # through the junction, -1 = none yet
+        ("go", "i8"),  # frames of throttle left in its plan through a junction, -1 = no plan
+        ("refused", "?"),  # the lane change of this decision was taken back
+        ("frames_trapped", "i8"),  # on which no plan stayed clear of everybody
+        ("pairs_examined", "i8"),  # pair-frames on which plans were checked against somebody
+        ("pairs_possible", "i8"),  # all pair-frames
         ("turn", "i8"),  # which of the two last frames is the last
         ("nominal_acceleration", "f8"),  # last command given from outside
         ("nominal_steering", "f8"),
@@ -91,7 +98,8 @@ STEP = np.dtype(
     [
         ("speed", "f8"),  # of the ego [m/s]
         ("crashed", "?"),
-        ("success", "?"),
+        ("success", "?"),  # has reached its goal, where there is one
+        ("time", "f8"),  # since reset [s]
         *[(f"reward_{k}", "f8") for k in range(REWARDS)],
         ("raw_reward", "f8"),
         # what the shield saw and did

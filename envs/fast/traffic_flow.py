@@ -50,6 +50,8 @@ def open_intersection(cars, episode, order, net, sight, config, target_speeds):
 @compiled
 def let_traffic_flow(cars, episode, order, net, config):
     """After each decision: cars that leave are gone, and a new one may come."""
+    for i in range(len(cars)):
+        cars[i].was = i if i < episode.cars else -1
     i = 0
     while i < episode.cars:
         lane = net.lanes[cars[i].lane]
@@ -85,6 +87,7 @@ def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, ne
     if _is_full(cars, episode):
         return
     i = add_on_lane(cars, episode, lane, s, speed, net.lanes, config)
+    cars[i].was = -1
     cars[i].route = net.plans[cars[i].lane, destination]
     cars[i].delta = uniform(episode, config.delta_low, config.delta_high)
 

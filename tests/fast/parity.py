@@ -26,7 +26,7 @@ BARE = (
     "intersection-v2",
     "highway-v0",
 )
-SHIELDED = ("highway-fast-v0", "merge-v0", "merge-v1", "two-way-v0", "exit-v0", "exit-v1")
+SHIELDED = tuple(env_id for env_id in BARE if env_id != "highway-v0")
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
 
 

@@ -136,8 +136,8 @@ def test_unknown_names_are_errors():
         envs.make_vec(ENV, 1, backend="slow")
     with pytest.raises(ValueError, match="shield"):
         envs.make_vec(ENV, 1, shield="off")
-    with pytest.raises(ValueError, match="RoundaboutEnv"):
-        envs.make_vec("roundabout-v0", 1, shield="override")
+    with pytest.raises(ValueError, match="signalised-intersection-v0"):
+        envs.make_vec("signalised-intersection-v0", 1, shield="override")
 
 
 def test_an_intervention_penalty_is_taken_from_the_reward():

@@ -1,0 +1,263 @@
+"""Which paths may each road user take? Routes are shared, assumed straight, or anything the road allows.
+
+known     routes and the lane that each driver heads for are shared (V2X)
+straight  everybody is expected to go straight on; wrong whenever somebody turns, for comparison only
+any       every path that fits where a car is; the worst counts
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from envs.fast.network import LANE, compile_network, heading_at, local_coordinates
+from envs.paths import compile_paths, lead_of, successors_of, walks
+from shield.compiled import compiled
+from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y
+from shield.geometry import wrap_angle
+from shield.junction import block
+from shield.plans import KNOWN, STRAIGHT, Track
+
+_OFF = 2.0  # lateral offset up to which a car may be on a lane [m]
+_TURNED = np.pi / 3  # angle to the lane up to which it may be [rad]
+_BEYOND = 3.0  # how far after its end, and before its start or where the lane before leads to it [m]
+_OFF_KNOWN, _TURNED_KNOWN, _BEYOND_KNOWN = 4.0, 1.4, 12.0  # likewise for a lane that it is known to head for
+_BETWEEN = 1.0  # further from the middle of the lane it heads for, a car is on the one beside it too [m]
+_ROLL = 1.05  # a wreck rolls to rest in this time at its speed [s]
+
+# One road user in the world, as a simulator says.
+CAR_ON_ROAD = np.dtype(
+    [
+        ("x", "f8"),
+        ("y", "f8"),
+        ("heading", "f8"),
+        ("speed", "f8"),
+        ("length", "f8"),
+        ("width", "f8"),
+        ("on", "i8"),  # lane it is on
+        ("lane", "i8"),  # lane it heads for, -1 = nobody knows
+        ("choice", "i8"),  # row of `Roads.choices`: paths of its route, -1 = nobody knows
+        ("wreck", "?"),
+    ],
+    align=True,
+)
+
+
+class Roads(NamedTuple):
+    """A road network as junction code needs it. L lanes, R rows of choices."""
+
+    paths: Paths
+    lanes: np.ndarray  # `[L]` LANE
+    choices: np.ndarray  # `[R, *]` paths, padded with -1
+    through: np.ndarray  # `[L]` row of the paths through each lane, one per way to go on
+    straight: np.ndarray  # `[L]` row of the straightest of them
+    limit: float  # highest speed limit of all lanes [m/s]
+    lead: np.ndarray  # `[L]` how far before its start cars come to a lane [m]
+    following: np.ndarray  # `[L]` each lane and those that follow, as sets of bits
+
+
+def no_roads() -> Roads:
+    """Stands in where no roads cross."""
+    none, rows = np.zeros((0, 0), np.int64), np.zeros(0, np.int64)
+    return Roads(
+        Paths(
+            np.zeros((0, 0, 6)),
+            rows,
+            none,
+            np.zeros((0, 0)),
+            np.zeros((0, 0, 0, 4), np.float32),
+            np.zeros((0, 0, 0), np.float32),
+            none,
+            none.astype(bool),
+            np.zeros((0, 0)),
+        ),
+        np.zeros(0, LANE),
+        none,
+        rows,
+        rows,
+        0.0,
+        np.zeros(0),
+        rows,
+    )
+
+
+class Junction:
+    """Paths of a road network, by the names that highway-env gives to lanes and nodes."""
+
+    def __init__(self, network) -> None:
+        self.number = {index: i for i, index in enumerate(network.lanes_dict())}
+        self.walks = walks(network)
+        self._rows: list[list[int]] = []
+        self._row_of: dict[tuple, int] = {}
+        through = [self._row(self._distinct(index)) for index in self.number]
+        straight = [self._row(self._straightest(network, index)) for index in self.number]
+        self._known: dict[tuple, int] = {}
+        lanes = compile_network(network, False).lanes
+        self.lead, self.following = lead_of(network), successors_of(network)
+        self.limit = float(lanes["speed_limit"].max())
+        self._arrays = (compile_paths(network, self.limit), lanes, np.array(through), np.array(straight))
+
+    @property
+    def roads(self) -> Roads:
+        """Everything as arrays; rows for routes that were asked about are included."""
+        paths, lanes, through, straight = self._arrays
+        choices = np.full((len(self._rows), max(map(len, self._rows))), -1)
+        for row, numbers in enumerate(self._rows):
+            choices[row, : len(numbers)] = numbers
+        return Roads(paths, lanes, choices, through, straight, self.limit, self.lead, self.following)
+
+    def choice(self, index, route) -> int:
+        """Row of the paths of a driver who heads for lane `index` with `route` ahead; a driver without a route: any."""
+        key = (index, tuple(step[:2] for step in route or ()))
+        if key not in self._known:
+            ways = self._distinct(index)
+            agreement = [_agreement(self._after(p, index), index, key[1]) for p in ways]
+            best = max(agreement)
+            self._known[key] = self._row([p for p, steps in zip(ways, agreement, strict=True) if steps == best])
+        return self._known[key]
+
+    def _after(self, path: int, index) -> list[tuple]:
+        walk = self.walks[path]
+        return walk[walk.index(index) + 1 :]
+
+    def _distinct(self, index) -> list[int]:
+        """Paths through a lane, one per way to go on."""
+        found: dict[tuple, int] = {}
+        for p, walk in enumerate(self.walks):
+            if index in walk:
+                found.setdefault(tuple(self._after(p, index)), p)
+        return list(found.values())
+
+    def _straightest(self, network, index) -> list[int]:
+        def turn(p: int) -> float:
+            lanes = [network.get_lane(i) for i in (index, *self._after(p, index))]
+            return abs(wrap_angle(lanes[-1].heading_at(lanes[-1].length) - lanes[0].heading_at(0.0)))
+
+        return sorted(self._distinct(index), key=turn)[:1]
+
+    def _row(self, numbers: list[int]) -> int:
+        row = self._row_of.setdefault(tuple(numbers), len(self._rows))
+        if row == len(self._rows):
+            self._rows.append(list(numbers))
+        return row
+
+
+def _agreement(after, index, route) -> int:
+    """How many steps of a route a walk follows."""
+    starts = [k for k, step in enumerate(route) if step[0] == index[1]]
+    rest = route[starts[0] :] if starts else ()
+    apart = (k for k, (lane, step) in enumerate(zip(after, rest, strict=False)) if lane[:2] != step)
+    return next(apart, min(len(after), len(rest)))
+
+
+@compiled
+def _changes_lane(roads, car):
+    """Is a car still on the lane beside the one that it heads for?"""
+    if car.on == car.lane or roads.lanes[car.on].road != roads.lanes[car.lane].road:
+        return False
+    return abs(local_coordinates(roads.lanes[car.lane], car.x, car.y)[1]) > _BETWEEN
+
+
+@compiled
+def track_of(roads, car, path):
+    """`Track` of the ego, which heads for a known lane; `path` is the one it was on before, -1 = none.
+
+    It stays on that, because paths that go on in the same way may have come from elsewhere.
+    """
+    if path < 0 or np.isnan(roads.paths.offset[path, car.lane]):
+        path = roads.choices[car.choice, 0]
+    s, _ = local_coordinates(roads.lanes[car.lane], car.x, car.y)
+    s += roads.paths.offset[path, car.lane]
+    beside, shift = -1, 0.0
+    if _changes_lane(roads, car):
+        beside = roads.choices[roads.through[car.on], 0]
+        shift = roads.paths.offset[beside, car.on] + local_coordinates(roads.lanes[car.on], car.x, car.y)[0] - s
+    return Track(path, s, car.speed, 0.5 * car.length, beside, shift)
+
+
+@compiled
+def list_threats(roads, track, cars, intent, v_cap, samples, threats, box):
+    """Ways that everybody else may take.
+
+    Args:
+      roads: `Roads`.
+      track: `Track` of the ego.
+      cars: `[N]` CAR_ON_ROAD, the others.
+      intent: KNOWN, STRAIGHT or ANY.
+      v_cap: speed above which nobody accelerates, whatever the limit of the lane [m/s].
+      samples: `[N]` SAMPLE, overwritten.
+      threats: `[M]` THREAT, overwritten.
+      box: `[6]`, room for one.
+
+    Returns:
+      How many threats there are; more than M if they did not fit.
+    """
+    count = 0
+    for i in range(len(cars)):
+        car = cars[i]
+        samples[i].x, samples[i].y, samples[i].speed = car.x, car.y, car.speed
+        samples[i].wreck, samples[i].astray, samples[i].lanes = car.wreck, False, 0
+        before = count
+        if not car.wreck:
+            if intent == KNOWN and car.lane >= 0 and car.choice >= 0:
+                if _fits(roads.lanes[car.lane], car, _BEYOND_KNOWN, _OFF_KNOWN, _TURNED_KNOWN):
+                    count = _add(roads, track, car.lane, car.choice, i, car, v_cap, threats, count)
+                    samples[i].lanes = 1 << car.lane
+                if _changes_lane(roads, car):
+                    count = _add(roads, track, car.on, roads.through[car.on], i, car, v_cap, threats, count)
+                    samples[i].lanes |= 1 << car.on
+            else:
+                for lane in range(len(roads.lanes)):
+                    if _fits(roads.lanes[lane], car, max(_BEYOND, roads.lead[lane]), _OFF, _TURNED):
+                        samples[i].lanes |= 1 << lane
+                        row = roads.straight[lane] if intent == STRAIGHT else roads.through[lane]
+                        count = _add(roads, track, lane, row, i, car, v_cap, threats, count)
+        samples[i].next_lanes = 0
+        for lane in range(len(roads.lanes)):
+            if samples[i].lanes >> lane & 1:
+                samples[i].next_lanes |= roads.following[lane]
+        if count == before:
+            samples[i].astray = not car.wreck
+            if count < len(threats):
+                _add_obstacle(roads, track, i, car, threats[count], box)
+            count += 1
+    return count
+
+
+@compiled
+def _fits(lane, car, before, off, turned):
+    """May a car be driving on a lane?"""
+    s, lateral = local_coordinates(lane, car.x, car.y)
+    if abs(lateral) > off or s < -before or s > lane.length + _BEYOND:
+        return False
+    return abs(wrap_angle(car.heading - heading_at(lane, s))) < turned
+
+
+@compiled
+def _add(roads, track, lane, row, i, car, v_cap, threats, count):
+    s, _ = local_coordinates(roads.lanes[lane], car.x, car.y)
+    for m in range(roads.choices.shape[1]):
+        path = roads.choices[row, m]
+        if path < 0:
+            break
+        if count < len(threats):
+            threat = threats[count]
+            threat.user, threat.path = i, path
+            threat.s, threat.v = roads.paths.offset[path, lane] + s, car.speed
+            threat.cap = min(v_cap, roads.limit)
+            threat.half_length, threat.wreck = 0.5 * car.length, False
+            threat.priority, threat.red_for = roads.paths.priority[track.path, path], 0.0
+        count += 1
+    return count
+
+
+@compiled
+def _add_obstacle(roads, track, i, car, threat, box):
+    """A wreck, or a car that is on no lane: it stays, or goes on straight to rest."""
+    roll = max(car.speed, 0.0) * _ROLL
+    cos, sin = np.cos(car.heading), np.sin(car.heading)
+    box[X], box[Y] = car.x + 0.5 * roll * cos, car.y + 0.5 * roll * sin
+    box[COS], box[SIN] = cos, sin
+    box[HALF_LENGTH], box[HALF_WIDTH] = 0.5 * (car.length + roll), 0.5 * car.width
+    threat.user, threat.path, threat.s, threat.v = i, -1, 0.0, max(car.speed, 0.0)
+    threat.half_length, threat.wreck, threat.cap, threat.priority = 0.5 * car.length, True, 0.0, 0
+    block(roads.paths, track, box, threat)

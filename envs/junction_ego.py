@@ -1,0 +1,198 @@
+"""The shield on one controlled vehicle where roads cross or merge: plans, besides distances along the lane."""
+
+import numpy as np
+
+from envs.highway import Settings, ShieldedEgo
+from envs.intent import CAR_ON_ROAD, Junction, list_threats, track_of
+from envs.signalised import SignalisedRoad
+from shield.blame import Verdict
+from shield.command import Command
+from shield.conflict_areas import CELL
+from shield.junction import (
+    CAUTIOUS,
+    CROSSING,
+    PLAN,
+    SAMPLE,
+    JunctionReport,
+    has_plan,
+    judge_crossing,
+    junction_frame,
+    no_report,
+)
+from shield.kinematics import stopping_distance
+from shield.plans import GO, STOP, THREAT, Scene
+from shield.signals import keep_right, may_pass
+
+PLAN_NAMES = {0: "inherited", STOP: "stop", GO: "go", STOP | GO: "both"}
+_junctions: dict[tuple, Junction] = {}
+
+
+def junction_of(network) -> Junction:
+    """Paths of a road network; the same roads are never measured twice in a process."""
+    lanes = [network.get_lane(index) for index in network.lanes_dict()]
+    ends = [tuple(lane.position(s, 0.0).round(3)) for lane in lanes for s in (0.0, lane.length)]
+    key = (*network.lanes_dict(), *ends, *((lane.priority, lane.speed_limit) for lane in lanes))
+    if key not in _junctions:
+        _junctions[key] = Junction(network)
+    return _junctions[key]
+
+
+class JunctionEgo(ShieldedEgo):
+    """`ShieldedEgo` with plans through junctions instead of distances along the lane."""
+
+    def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
+        super().__init__(vehicle, settings, record)
+        self.junction = junction_of(vehicle.road.network)
+        self.crossings = np.zeros(0, CROSSING)
+        self.samples = np.zeros(0, SAMPLE)
+        self.plan = np.zeros(1, PLAN)[0]
+        self.plan["go"] = -1
+        self.room = np.zeros(64, THREAT)
+        self.box = np.zeros(6)
+        self.path = -1
+        self.refused = False  # the lane change of this decision
+        self.report: JunctionReport = no_report(0.0)
+        self.frames_trapped = 0
+        self.pairs_examined = self.pairs_possible = 0  # pair-frames: plans were checked against somebody, could be
+        self.may_pass: bool | None = None  # the light ahead
+
+    def _grant(self, wish: Command) -> Command:
+        settings = self.settings
+        track, threats, roads = self._look()
+        if isinstance(self.vehicle.road, SignalisedRoad):
+            threats = self._heed_lights(self.vehicle.road, track, threats, roads)
+        self.report = junction_frame(
+            Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt),
+            self.samples,
+            self.crossings,
+            self.plan,
+            wish.acceleration,
+            settings.entry,
+            not settings.waits_anywhere,
+            settings.examine,
+            settings.overrides,
+        )
+        self.frames_trapped += self.report.trapped
+        self.pairs_examined += self.report.examined
+        self.pairs_possible += self.report.possible
+        return wish._replace(acceleration=self.report.acceleration) if settings.overrides else wish
+
+    def act(self, action=None) -> None:
+        before = getattr(self.vehicle, "target_lane_index", None)
+        super().act(action)
+        if action is not None:
+            self.refused = False
+            if self.settings.overrides and self.contact is None:
+                self._gate(before)
+
+    def _gate(self, before) -> None:
+        """Take back a lane change that leaves no plan. No vehicle has moved since the agent asked for it."""
+        vehicle, settings = self.vehicle, self.settings
+        if before is None or vehicle.target_lane_index in (before, None):
+            return
+        if vehicle.target_lane_index[:2] != before[:2]:  # the road went on
+            return
+        self._meet()
+        path = self.path
+        track, threats, roads = self._look()
+        scene = Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt)
+        if not has_plan(scene, self.crossings, settings.entry, not settings.waits_anywhere):
+            vehicle.target_lane_index, self.path = before, path
+            self.refused = True
+
+    def _count(self, report, pairs: int, broken: int, acceleration_change: float, steering_change: float) -> None:
+        plans, refused = self.report, self.refused
+        self.refused = False
+        report = report._replace(
+            overridden=plans.overridden or refused,
+            limited=plans.limited and not refused,
+            response=plans.response,
+            ttc=plans.ttc,
+        )
+        super()._count(report, pairs + plans.pairs, broken + plans.broken, acceleration_change, steering_change)
+
+    def _look(self):
+        """The ego's track, the ways of all others, and the roads."""
+        vehicle, junction = self.vehicle, self.junction
+        cars = np.zeros(len(self.others) + 1, CAR_ON_ROAD)
+        for car, v in zip(cars, [*self.others, vehicle], strict=True):
+            car["x"], car["y"] = v.position
+            car["heading"], car["speed"], car["length"], car["width"] = v.heading, v.speed, v.LENGTH, v.WIDTH
+            car["wreck"] = v.crashed or not hasattr(v, "action")
+            car["on"] = junction.number[v.lane_index]
+            car["lane"] = car["choice"] = -1
+            heads_for = getattr(v, "target_lane_index", None)
+            if heads_for is not None:
+                car["lane"], car["choice"] = junction.number[heads_for], junction.choice(heads_for, v.route)
+        roads, settings = junction.roads, self.settings
+        track = track_of(roads, cars[-1], self.path)
+        self.path = track.path
+        self.samples = np.zeros(len(self.others), SAMPLE)
+        common = (roads, track, cars[:-1], settings.intent, settings.other.v_cap, self.samples)
+        count = list_threats(*common, self.room, self.box)
+        if count > len(self.room):
+            self.room = np.zeros(2 * count, THREAT)
+            count = list_threats(*common, self.room, self.box)
+        return track, self.room[:count], roads
+
+    def _heed_lights(self, road: SignalisedRoad, track, threats, roads):
+        """Lights say who has the right of way; where the ego has not, its line is an obstacle."""
+        vehicle = self.vehicle
+        approach, distance = road.approach_of(vehicle), road.distance_to_line(vehicle)
+        if approach < 0:
+            return threats
+        ahead = road.signal(approach), distance, max(vehicle.speed, 0.0), self.settings.ego
+        if self.may_pass is None:
+            self.may_pass = bool(may_pass(*ahead))
+        elif distance > 0.0:
+            self.may_pass = bool(keep_right(self.may_pass, *ahead))
+        for threat in threats:
+            other = self.others[threat["user"]]
+            if threat["path"] >= 0 and road.approach_of(other) >= 0:
+                self._rank(road, other, threat)
+        if self.may_pass or distance <= 0.0:
+            return threats
+        count = len(threats)
+        if count == len(self.room):
+            self.room = np.concatenate([self.room, np.zeros(count + 1, THREAT)])
+        light = self.room[count]
+        light["user"] = light["path"] = -1
+        light["from_cell"] = int(np.ceil((track.s + distance) / CELL - 1e-6))
+        light["to_cell"] = roads.paths.cells[track.path]
+        return self.room[: count + 1]
+
+    def _rank(self, road: SignalisedRoad, other, threat) -> None:
+        """Who goes first by the lights, and is the other counted on to wait for its own?"""
+        settings = self.settings
+        has_right, left = road.has_right(other), road.distance_to_line(other)
+        if self.may_pass != has_right:
+            threat["priority"] = 1 if self.may_pass else -1
+        elif not road.same_group(self.vehicle, other):
+            threat["priority"] = 0
+        if has_right or road.has_left(other):
+            return
+        if left > 0.0 and stopping_distance(other.speed, settings.other.a_min_brake) <= left:
+            if settings.entry != CAUTIOUS:
+                threat["line"] = threat["s"] + left
+                threat["red_for"] = road.time_to_green(road.approach_of(other))
+        else:  # it was able to stop when its green ended
+            self.crossings[threat["user"]]["relied"] = True
+
+    def _follow(self, others: list) -> None:
+        old = {id(other): i for i, other in enumerate(self.others)}
+        crossings = np.zeros(len(others), CROSSING)
+        for i, other in enumerate(others):
+            if id(other) in old:
+                crossings[i] = self.crossings[old[id(other)]]
+        self.crossings = crossings
+        super()._follow(others)
+
+    def _is_elsewhere(self, other) -> bool:
+        return True
+
+    def _verdict(self, i: int, ego, user) -> Verdict:
+        self._look()
+        return judge_crossing(self.samples[i], self.crossings[i], self.settings.other, self.settings.dt)
+
+    def _danger(self, i: int, kind: int) -> str:
+        return PLAN_NAMES[kind]

@@ -1,0 +1,60 @@
+"""One controlled vehicle under the shield, from one decision step to the next: what all wrappers have in common."""
+
+from typing import Any
+
+from envs.highway import LANES, Settings, ShieldedEgo, StepTally, response_name
+from envs.junction_ego import JunctionEgo
+
+LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
+
+
+def attach(vehicle: Any, settings: Settings, record: bool = False) -> ShieldedEgo:
+    """Put a shield on a vehicle."""
+    return (ShieldedEgo if settings.scheme == LANES else JunctionEgo)(vehicle, settings, record)
+
+
+def begin_step(ego: ShieldedEgo) -> bool:
+    """Start counting anew; returns whether the ego has had its contact before this step."""
+    ego.tally = StepTally()
+    return ego.contact is not None
+
+
+def end_step(ego: ShieldedEgo, had_contact: bool, action: Any) -> dict[str, Any]:
+    """Judge what happened since `begin_step`; returns the info of this step."""
+    ego.check_contact()
+    at_fault = not had_contact and ego.contact is not None and ego.contact["verdict"] in ("ego", "both")
+    cost = 1.0 if ego.tally.broken_duties or at_fault else 0.0
+    ego.cost += cost
+    info = info_of(ego, cost)
+    info["shield"]["proposed_action"] = action
+    return info
+
+
+def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
+    """What a wrapper says about one ego after a step; see `ShieldWrapper` for the keys."""
+    tally = ego.tally
+    frames = max(tally.frames, 1)
+    return {
+        "shield": {
+            "intervened": tally.overridden > 0,
+            "override_fraction": tally.overridden / frames,
+            "limited_fraction": tally.limited / frames,
+            "acceleration_change": tally.acceleration_change,
+            "steering_change": tally.steering_change,
+            "dangerous": tally.dangerous_pairs > 0,
+            "dangerous_pairs": tally.dangerous_pairs,
+            "broken_duties": tally.broken_duties,
+            "min_margin_lon": tally.margin_lon,
+            "min_margin_lat": tally.margin_lat,
+            "partner": tally.partner,
+            "response": response_name(tally.response),
+        },
+        "cost": cost,
+        "blame": ego.contact["verdict"] if ego.contact else "",
+        "blame_evidence": dict(ego.contact) if ego.contact else {},
+        "override_share": ego.frames_overridden / max(ego.frames, 1),
+        "episode_cost": ego.cost,
+        "episode_dangerous_pairs": ego.dangerous_pairs,
+        "episode_broken_duties": ego.broken_duties,
+        "min_ttc": min(ego.min_ttc, LONGEST_TTC),
+    }

@@ -1,0 +1,143 @@
+"""Conflict areas of paths: where on one path a car is in the way of a car on another (Defs. 14, 16, 17).
+
+A path is a chain of lanes that a driver may follow through a junction. It is cut into cells of `CELL`
+metres of arc length; each cell has a box that holds every car whose centre is in it, whatever its speed
+(the swept width). Two cells are in conflict iff their boxes overlap. Seen from a cell of one path, the
+conflicting stretch of another path is at most two intervals of arc length: a ring road may be met twice.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shield.compiled import compiled, compiled_for_arrays
+
+CELL = 0.5  # length of a cell [m]
+X, Y, COS, SIN, HALF_LENGTH, HALF_WIDTH = range(6)  # columns of a box
+_NOTHING = np.inf
+
+
+class Paths(NamedTuple):
+    """All paths of a road network. P paths of at most C cells, L lanes, at most T paths through a lane."""
+
+    boxes: np.ndarray  # `[P, C, 6]` swept box of each cell
+    cells: np.ndarray  # `[P]` cells of each path
+    lane: np.ndarray  # `[P, C]` lane that a car in the cell follows
+    offset: np.ndarray  # `[P, L]` arc length at which a lane begins on a path, nan = not part of it [m]
+    conflicts: np.ndarray  # `[P, P, C, 4]` float32: from, to, from, to on the second path [m]; inf, -inf = none
+    first: np.ndarray  # `[P, P, C]` float32: where the second path first conflicts with the first from a cell on [m]
+    priority: np.ndarray  # `[P, P]` +1: the first has the right of way over the second, -1: the other way round
+    crossed: np.ndarray  # `[P, C]` a car standing there is in the way of a path that it is not on
+    speed_limit: np.ndarray  # `[P, C]` [m/s], inf = none
+
+
+@compiled
+def cell_of(s, cells):
+    """Index of the cell at arc length `s`; the first and the last one reach to infinity."""
+    return min(max(int(np.floor(s / CELL)), 0), cells - 1)
+
+
+@compiled
+def boxes_overlap(a, b, margin):
+    """Do two oriented boxes come nearer to each other than `margin` [m] (separating axes)?"""
+    dx, dy = b[X] - a[X], b[Y] - a[Y]
+    cos, sin = abs(a[COS] * b[COS] + a[SIN] * b[SIN]), abs(a[COS] * b[SIN] - a[SIN] * b[COS])
+    return not (
+        abs(dx * a[COS] + dy * a[SIN]) > a[HALF_LENGTH] + margin + b[HALF_LENGTH] * cos + b[HALF_WIDTH] * sin
+        or abs(dy * a[COS] - dx * a[SIN]) > a[HALF_WIDTH] + margin + b[HALF_LENGTH] * sin + b[HALF_WIDTH] * cos
+        or abs(dx * b[COS] + dy * b[SIN]) > b[HALF_LENGTH] + margin + a[HALF_LENGTH] * cos + a[HALF_WIDTH] * sin
+        or abs(dy * b[COS] - dx * b[SIN]) > b[HALF_WIDTH] + margin + a[HALF_LENGTH] * sin + a[HALF_WIDTH] * cos
+    )
+
+
+@compiled_for_arrays
+def swept_boxes(poses, half_length, half_width, margin_lon, margin_lat, out):
+    """Smallest box around all cars of a cell, for each cell of one path.
+
+    Args:
+      poses: `[C, V, 3]` x, y [m] and heading [rad] of tracked cars in each cell, nan = no such car.
+      half_length, half_width: of a car [m].
+      margin_lon, margin_lat: added on every side [m].
+      out: `[C, 6]` boxes, overwritten.
+    """
+    for c in range(len(poses)):
+        cos = sin = 0.0
+        for v in range(poses.shape[1]):
+            if not np.isnan(poses[c, v, 0]):
+                cos += np.cos(poses[c, v, 2])
+                sin += np.sin(poses[c, v, 2])
+        norm = np.hypot(cos, sin)
+        cos, sin = cos / norm, sin / norm
+        low_a = low_b = np.inf
+        high_a = high_b = -np.inf
+        for v in range(poses.shape[1]):
+            if np.isnan(poses[c, v, 0]):
+                continue
+            a = poses[c, v, 0] * cos + poses[c, v, 1] * sin
+            b = poses[c, v, 1] * cos - poses[c, v, 0] * sin
+            turn_cos = abs(np.cos(poses[c, v, 2]) * cos + np.sin(poses[c, v, 2]) * sin)
+            turn_sin = abs(np.sin(poses[c, v, 2]) * cos - np.cos(poses[c, v, 2]) * sin)
+            along = half_length * turn_cos + half_width * turn_sin
+            across = half_length * turn_sin + half_width * turn_cos
+            low_a, high_a = min(low_a, a - along), max(high_a, a + along)
+            low_b, high_b = min(low_b, b - across), max(high_b, b + across)
+        a, b = 0.5 * (low_a + high_a), 0.5 * (low_b + high_b)
+        out[c, X], out[c, Y] = a * cos - b * sin, a * sin + b * cos
+        out[c, COS], out[c, SIN] = cos, sin
+        out[c, HALF_LENGTH] = 0.5 * (high_a - low_a) + margin_lon
+        out[c, HALF_WIDTH] = 0.5 * (high_b - low_b) + margin_lat
+
+
+@compiled_for_arrays
+def find_conflicts(boxes, cells, conflicts, first):
+    """Fill in `Paths.conflicts` and `Paths.first`.
+
+    Args:
+      boxes, cells: as in `Paths`.
+      conflicts: `[P, P, C, 4]`, first: `[P, P, C]`, overwritten.
+    """
+    paths = len(cells)
+    for a in range(paths):
+        for b in range(paths):
+            nearest = _NOTHING
+            for i in range(cells[a] - 1, -1, -1):
+                interval = conflicts[a, b, i]
+                interval[0] = interval[2] = _NOTHING
+                interval[1] = interval[3] = -_NOTHING
+                _conflicts_of_cell(boxes[a, i], boxes[b], cells[b], interval)
+                nearest = min(nearest, interval[0])
+                first[a, b, i] = nearest
+
+
+@compiled
+def _conflicts_of_cell(box, others, count, interval):
+    reach = np.hypot(box[HALF_LENGTH], box[HALF_WIDTH])
+    k, inside = 0, False
+    while k < count:
+        other = others[k]
+        far = np.hypot(other[X] - box[X], other[Y] - box[Y]) - reach - np.hypot(other[HALF_LENGTH], other[HALF_WIDTH])
+        if far > 0.0:
+            # neighbouring cells lie at most two cells apart, so the next few cannot touch either
+            inside = False
+            k += max(int((far - 1.0) / (2 * CELL)), 1)
+            continue
+        touches = boxes_overlap(box, other, 0.0)
+        if touches:
+            start, end = k * CELL, (k + 1) * CELL
+            if interval[0] == _NOTHING:
+                interval[0], interval[1] = start, end
+            elif interval[2] == _NOTHING and (inside or start - interval[1] < 4 * CELL):
+                interval[1] = end
+            elif interval[2] == _NOTHING:
+                interval[2], interval[3] = start, end
+            else:
+                interval[3] = end
+        inside = touches
+        k += 1
+
+
+@compiled
+def in_conflict(paths, a, i, b, low, high):
+    """Is a car in cell `i` of path `a` in the way of one that is somewhere in [low, high] on path `b` [m]?"""
+    interval = paths.conflicts[a, b, i]
+    return (interval[0] <= high and low <= interval[1]) or (interval[2] <= high and low <= interval[3])

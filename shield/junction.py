@@ -1,0 +1,448 @@
+"""One frame of the shield at a junction: keep a plan that stays clear of everybody (Defs. 17, 18, 27).
+
+Whatever the agent wants, it may do as long as a plan remains afterwards that meets nobody. If none
+would remain, the plan that was found before is carried out: it stays clear because everybody keeps to
+the bounds it was made for. That is the proper response of Def. 18: stop where stopping was safe, go on
+where only going on was.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shield.blame import (
+    ACCELERATED,
+    BOTH,
+    BRAKED,
+    CRASHED,
+    CUT_IN,
+    EGO,
+    GAVE_NO_WAY,
+    INHERITED,
+    KEPT,
+    LEFT_NO_PLAN,
+    LEFT_PATHS,
+    NOBODY,
+    OTHER,
+    REVERSED,
+    TOO_FAR,
+    WAVERED,
+    Verdict,
+)
+from shield.compiled import compiled, merged
+from shield.conflict_areas import CELL, boxes_overlap, cell_of
+from shield.controller import RESPONSE_BRAKE, RESPONSE_GO
+from shield.examined import TABLE, count_examined, examine, is_left_out
+from shield.plans import (
+    GO,
+    NEVER,
+    STOP,
+    begin,
+    behind_by,
+    can_give_way,
+    distance_behind,
+    go_plan,
+    on_path_of_ego,
+    plan_conflict,
+    stop_conflict,
+    tail_conflict,
+    throttle,
+)
+
+CAUTIOUS, PRIORITY, ASSERTIVE = range(3)  # whom the ego expects to give way: nobody, who must, who can
+ENTRIES = ("cautious", "priority", "assertive")
+SLACK = 0.2  # a new plan stays clear even if the ego is this far off; one in force only has to stay clear [m]
+_IMMINENT = 2.0  # [s]
+_TOLERANCE = 1e-6
+_REVERSING = 0.1  # slower than this backwards is standing [m/s]
+_JITTER = 0.02  # speeds of others are read off a simulator that integrates in steps [m/s]
+
+# What the ego remembers of one road user. SI units.
+CROSSING = np.dtype(
+    [
+        ("age", "i8"),  # samples since first sight
+        ("since", "i8"),  # frames since the last sample with a plan; 0 = there is one now
+        ("items", "i8"),  # plans at that sample: STOP, GO or both; 0 = never any
+        ("follows", "?"),  # was behind the ego at the last sample
+        ("behind", "?"),  # and has been so at a safe distance
+        ("relied", "?"),  # is counted on to give way on this frame
+        ("relied_before", "?"),  # was so on the frame before
+        ("wreck", "?"),  # at the last sample
+        ("astray", "?"),  # was on no path then
+        ("x", "f8"),  # at the last sample
+        ("y", "f8"),
+        ("speed", "f8"),
+        ("lanes", "i8"),  # lanes on which it may be now or next, as a set of bits
+        ("ego_broke", "i8"),  # first duty each broke since the last sample with a plan, index into `blame.DUTIES`
+        ("ego_excess", "f8"),
+        ("other_broke", "i8"),
+        ("other_excess", "f8"),
+    ],
+    align=True,
+)
+
+# What the ego reads of one road user on one sample. SI units.
+SAMPLE = np.dtype(
+    [
+        ("x", "f8"),
+        ("y", "f8"),
+        ("speed", "f8"),
+        ("lanes", "i8"),  # lanes on which it may be, as a set of bits
+        ("next_lanes", "i8"),  # these and the ones that follow
+        ("wreck", "?"),
+        ("astray", "?"),  # on no lane at all
+    ],
+    align=True,
+)
+
+# The plan in force.
+PLAN = np.dtype([("go", "i8")], align=True)  # frames of throttle left, -1 = no plan
+
+
+class JunctionReport(NamedTuple):
+    """What the shield saw and did on one frame."""
+
+    acceleration: float  # what it lets through [m/s^2]
+    overridden: bool  # somebody's presence changed it
+    limited: bool  # only the limits of acceleration did
+    response: int  # RESPONSE_BRAKE or RESPONSE_GO where it was overridden, else 0
+    pairs: int  # road users toward whom the ego is not free
+    broken: int  # those toward whom it broke its duty
+    trapped: bool  # no plan stays clear of everybody
+    ttc: float  # time to collision with a car ahead on the path [s]
+    examined: int  # road users against whom plans are checked
+    possible: int  # all road users
+
+
+@compiled
+def no_report(nominal):
+    """`JunctionReport` where there is no junction."""
+    return JunctionReport(nominal, False, False, 0, 0, 0, False, np.inf, 0, 0)
+
+
+@compiled
+def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides):
+    """Restrict the ego's acceleration to what leaves it a plan, and judge everybody.
+
+    Args:
+      scene: `Scene`; what its threats say about plans is changed.
+      samples: `[N]` SAMPLE of all road users.
+      memory: `[N]` CROSSING, changed in place.
+      plan: PLAN, or any record with its field, changed in place.
+      nominal: acceleration that the ego's own controller asks for [m/s^2].
+      entry: CAUTIOUS, PRIORITY or ASSERTIVE.
+      at_line: the ego may rest only where it is in nobody's way, whoever may come.
+      which: against whom plans are checked, index into `shield.examined.EXAMINED`.
+      overrides: False = watch only.
+
+    Returns:
+      `JunctionReport`.
+    """
+    sort_out(scene, memory, entry)
+    examine(scene, samples, which, SLACK)
+    limited = limit(nominal, scene.track.v, scene.ego, scene.dt)
+    a, clear, trapped = limited, False, False
+    if overrides:
+        a, clear, trapped = _choose(scene, plan, limited, at_line)
+    pairs = broken = 0
+    for i in range(len(samples)):
+        known = clear and (which <= TABLE or not is_left_out(scene, i))
+        dangerous, kept = judge_user(scene, i, samples[i], memory[i], a, known, trapped)
+        pairs += dangerous
+        broken += not kept
+    response = RESPONSE_BRAKE if a < limited else RESPONSE_GO if a > limited else 0
+    return JunctionReport(
+        a,
+        a != limited,
+        limited != nominal and a == limited,
+        response,
+        pairs,
+        broken,
+        trapped,
+        _ttc(scene),
+        count_examined(scene, len(samples)),
+        len(samples),
+    )
+
+
+@compiled
+def has_plan(scene, memory, entry, at_line):
+    """Would braking now, or going on, stay clear of everybody? Asked before a lane change.
+
+    Nobody may find the ego closer ahead than a follower's safe distance who did not follow it before.
+    """
+    for i in range(len(memory)):
+        follows, gap_is_safe = _is_behind(scene, i, memory[i].behind)
+        if follows and not (gap_is_safe or memory[i].behind):
+            return False
+    sort_out(scene, memory, entry)
+    brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
+    if stop_conflict(scene, brake, -1, at_line, SLACK) == NEVER:
+        return True
+    return go_plan(scene, throttle(scene, scene.track.s, scene.track.v), -1, at_line, SLACK)[0] >= 0
+
+
+@merged
+def limit(a, v, ego, dt):
+    """Limits that always hold: never harder than the parameters say, never backwards [m/s^2]."""
+    a = min(max(a, -ego.a_max_brake), ego.a_max_accel, max((ego.v_cap - v) / dt, 0.0))
+    return max(a, -max(v, 0.0) / dt)
+
+
+@compiled
+def sort_out(scene, memory, entry):
+    """Mark the ways of others that the ego need not stay clear of: followers, and who must give way."""
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        threat.ignored = threat.left_out = False
+        if threat.path < 0:
+            continue
+        if is_follower(scene, threat, memory[threat.user].behind):
+            threat.ignored = True
+        elif entry != CAUTIOUS and not threat.wreck and threat.red_for == 0.0:
+            obliged = entry == ASSERTIVE or threat.priority > 0
+            if obliged and can_give_way(scene, threat):
+                threat.ignored = True
+                memory[threat.user].relied = True
+
+
+@merged
+def is_follower(scene, threat, established):
+    """Does a road user drive behind the ego on its way, or is it behind on a way that has just parted from it?
+
+    Beside the ego it is no follower, unless it has been one before.
+    """
+    paths, track = scene.paths, scene.track
+    bodies = 0.0 if established else track.half_length + threat.half_length
+    if behind_by(paths, track, threat) > bodies:
+        return True
+    entered_ego, from_ego = _entered(paths, track.path, track.s)
+    entered_other, from_other = _entered(paths, threat.path, threat.s)
+    return from_ego >= 0 and from_ego == from_other and track.s - entered_ego - (threat.s - entered_other) > bodies
+
+
+@merged
+def _entered(paths, path, s):
+    """Where on a path a driver at `s` headed for its lane [m], and the lane before, -1 = none."""
+    i = cell_of(s, paths.cells[path])
+    lane = paths.lane[path, i]
+    while i >= 0 and paths.lane[path, i] == lane:
+        i -= 1
+    return (i + 1) * CELL, paths.lane[path, i] if i >= 0 else -1
+
+
+@compiled
+def _choose(scene, plan, a, at_line):
+    """Acceleration of this frame, whether a plan remains, and whether none is left to the ego."""
+    if stop_conflict(scene, a, -1, at_line, SLACK) == NEVER:
+        plan.go = 0
+        return a, True, False
+    go, _ = go_plan(scene, a, -1, at_line, SLACK)
+    if go >= 0:
+        plan.go = go
+        return a, True, False
+    go_now = throttle(scene, scene.track.s, scene.track.v)
+    brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
+    if plan.go >= 0 and plan_conflict(scene, plan.go, -1, 0.0) == NEVER:
+        goes = plan.go > 0
+        plan.go = max(plan.go - 1, 0)
+        return (go_now if goes else brake), True, False
+    return _escape(scene, plan, go_now, brake)
+
+
+@compiled
+def _escape(scene, plan, go_now, brake):
+    """Somebody left their bounds, or appeared: the plan that stays clear of everybody for longest."""
+    stop_at = stop_conflict(scene, brake, -1, False, 0.0)
+    if stop_at == NEVER:
+        plan.go = 0
+        return brake, True, False
+    go, go_at = go_plan(scene, go_now, -1, False, 0.0)
+    if go >= 0:
+        plan.go = go
+        return go_now, True, False
+    plan.go = -1
+    begin(scene)
+    track, ego = scene.track, scene.ego
+    hard_at = tail_conflict(scene, track.s, track.v, 0, ego.a_max_brake, -1, False, 0.0)
+    # to stop comes first, unless somebody is about to arrive (junction hole H7)
+    if max(stop_at, hard_at) * scene.dt < _IMMINENT and go_at > max(stop_at, hard_at):
+        return go_now, False, True
+    return (limit(-ego.a_max_brake, track.v, ego, scene.dt) if hard_at > stop_at else brake), False, True
+
+
+# ---------------------------------------------------------------- who broke a duty: Def. 27
+
+
+@compiled
+def judge_user(scene, i, sample, memory, a, clear, trapped):
+    """Take in one sample of one road user and judge the ego's acceleration toward it.
+
+    Args:
+      scene: `Scene`.
+      i: index of the road user; sample: its SAMPLE; memory: its CROSSING, changed in place.
+      a: acceleration that the ego executes on this frame [m/s^2].
+      clear: a plan that stays clear of everybody is known to remain afterwards.
+      trapped: no plan stays clear of everybody, because somebody appeared or left the bounds. Duties
+        toward several then contradict each other: what is owed is to brake, or to go on, with all it has.
+
+    Returns:
+      (dangerous, kept): is the ego not free toward this road user, and did it keep its duty? A contact is
+      judged more strictly: whoever left itself no plan toward the other is to blame, trapped or not.
+    """
+    _judge_motion(sample, memory, scene.other, scene.dt)
+    follows, gap_is_safe = _is_behind(scene, i, memory.behind)
+    dangerous, kept, items, cut_in = False, True, STOP, False
+    if follows:
+        memory.behind |= gap_is_safe
+        items = STOP if memory.behind else 0
+        cut_in = not (memory.follows or clear) and memory.age > 0 and items == 0 and memory.other_broke == KEPT
+    else:
+        memory.behind = False
+        strongest = limit(scene.ego.a_max_accel, scene.track.v, scene.ego, scene.dt)
+        if stop_conflict(scene, strongest, i, False, 0.0) != NEVER:
+            dangerous = True
+            if not clear:
+                items = _plans_now(scene, i)
+                kept = _is_kept(scene, i, a, items)
+    if items != 0:
+        memory.items, memory.since = items, 0
+        memory.ego_broke = memory.other_broke = KEPT
+        memory.ego_excess = memory.other_excess = 0.0
+    else:
+        memory.since += 1
+    if cut_in:
+        dangerous, kept = True, False
+        memory.ego_broke = CUT_IN
+    memory.follows = follows
+    if not kept and memory.ego_broke == KEPT:
+        memory.ego_broke = LEFT_NO_PLAN if items != 0 else WAVERED
+        memory.ego_excess = abs(a)
+    if trapped and not kept and not cut_in:
+        kept = _is_kept(scene, i, a, 0)
+    memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
+    memory.wreck, memory.astray = sample.wreck, sample.astray
+    memory.age += 1
+    memory.relied, memory.relied_before = False, memory.relied
+    return dangerous, kept
+
+
+@merged
+def _judge_motion(sample, memory, other, dt):
+    """Did a road user leave the bounds that plans assume, since the last sample?"""
+    if memory.age == 0:
+        return
+    faster = sample.speed - max(memory.speed, min(memory.speed + other.a_max_accel * dt, other.v_cap))
+    slower = memory.speed - other.a_max_brake * dt - sample.speed
+    duty, excess = KEPT, 0.0
+    moved = np.hypot(sample.x - memory.x, sample.y - memory.y)
+    if sample.wreck and (not memory.wreck or moved > _JITTER * dt):
+        duty = CRASHED
+    elif (sample.astray and not memory.astray) or sample.lanes & ~memory.lanes != 0:
+        duty = LEFT_PATHS
+    elif faster > _JITTER and not sample.wreck:
+        duty, excess = ACCELERATED, faster / dt
+    elif slower > _JITTER and not sample.wreck:
+        duty, excess = BRAKED, slower / dt
+    elif sample.speed < -_REVERSING:
+        duty, excess = REVERSED, -sample.speed
+    elif memory.relied_before:
+        duty = GAVE_NO_WAY  # forgotten by `judge_user` if the ego still has a plan
+    if duty != KEPT and memory.other_broke == KEPT:
+        memory.other_broke, memory.other_excess = duty, excess
+
+
+@merged
+def _is_behind(scene, i, established):
+    """Does a road user follow the ego, whatever way it takes, and at a safe distance (Lemma 2)?"""
+    behind, safe, other = False, True, scene.other
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        if threat.user != i:
+            continue
+        if threat.path < 0 or not is_follower(scene, threat, established):
+            return False, False
+        behind = True
+        distance = behind_by(scene.paths, scene.track, threat)
+        gap = distance - scene.track.half_length - threat.half_length
+        # where their ways have parted already, no distance is needed
+        safe = safe and (distance < 0.0 or gap >= distance_behind(threat, max(threat.v, 0.0), scene.track.v, other))
+    return behind, safe
+
+
+@compiled
+def _plans_now(scene, i):
+    """Kinds of plans that stay clear of one road user from this sample on."""
+    brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
+    if stop_conflict(scene, brake, i, False, 0.0) == NEVER:
+        return STOP
+    return GO if go_plan(scene, throttle(scene, scene.track.s, scene.track.v), i, False, 0.0)[0] >= 0 else 0
+
+
+@compiled
+def _is_kept(scene, i, a, items):
+    """Does the ego's acceleration leave it a plan? Where there is none, does it brake or go on with all it has?"""
+    if items == 0:
+        stops = scene.track.v + a * scene.dt <= _TOLERANCE
+        goes = a >= throttle(scene, scene.track.s, scene.track.v) - _TOLERANCE
+        return stops or goes or a <= -scene.ego.a_min_brake + _TOLERANCE
+    return stop_conflict(scene, a, i, False, 0.0) == NEVER or go_plan(scene, a, i, False, 0.0)[0] >= 0
+
+
+@compiled
+def judge_crossing(sample, memory, other, dt):
+    """Verdict at the first contact with one road user (Def. 27).
+
+    Args:
+      sample: SAMPLE at the sample at which there is contact or it is predicted.
+      memory: CROSSING after the one before.
+
+    Returns:
+      `Verdict`.
+    """
+    _judge_motion(sample, memory, other, dt)
+    ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
+    if memory.behind:
+        verdict = OTHER
+        if memory.other_broke == KEPT:
+            memory.other_broke = TOO_FAR
+    elif memory.items == 0:
+        verdict = EGO if ego_broke else INHERITED
+    elif ego_broke:
+        verdict = BOTH if other_broke else EGO
+    else:
+        verdict = OTHER if other_broke else NOBODY
+    return Verdict(
+        verdict,
+        memory.items,
+        memory.since,
+        memory.ego_broke,
+        memory.ego_excess,
+        memory.other_broke,
+        memory.other_excess,
+    )
+
+
+@merged
+def _ttc(scene):
+    """Time to collision with a slower road user ahead on the ego's lane [s]; inf if there is none."""
+    ttc, track = np.inf, scene.track
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        if threat.path >= 0 and threat.v < track.v:
+            s = on_path_of_ego(scene.paths, track.path, track.s, threat, threat.s)
+            gap = s - track.s - track.half_length - threat.half_length
+            if track.s <= s < np.inf:
+                ttc = min(ttc, max(gap, 0.0) / (track.v - threat.v))
+    return ttc
+
+
+@compiled
+def block(paths, track, box, threat):
+    """Fill in which cells of the ego's path ahead an obstacle is in the way of."""
+    from_cell, to_cell = NEVER, -1
+    path = track.path
+    for i in range(cell_of(track.s, paths.cells[path]), paths.cells[path]):
+        if boxes_overlap(paths.boxes[path, i], box, 0.0):
+            from_cell, to_cell = min(from_cell, i), i
+    threat.from_cell, threat.to_cell = from_cell, to_cell

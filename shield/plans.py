@@ -1,0 +1,340 @@
+"""Plans of the ego through a junction, and whether they stay clear of everybody (Def. 17, pointwise in time).
+
+A plan is a throttle phase at `a_max_accel`, possibly empty, and then braking at `a_min_brake` to rest. It
+is clear of a car iff on no frame the ego is in the way of any place where that car may be by then: it may
+brake at `a_max_brake` or accelerate at `a_max_accel`, on any of the paths it may follow. That makes the
+items of Def. 17 safe where the published ones compare end points only:
+
+  item 1   the ego stops before the conflict area;
+  item 2   the ego follows through the area behind the other, or leads it: on every frame, not at rest only;
+  item 3   the ego has left the area before the other can arrive, without any braking by the other.
+
+A follower on the ego's own lane has to keep its distance itself (Lemma 2); a car that merges behind the
+ego counts as one once its distance is safe.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shield.compiled import compiled, merged
+from shield.conflict_areas import CELL, Paths, cell_of, in_conflict
+from shield.kinematics import response_distance, stopping_distance, travel
+from shield.longitudinal import d_min_following
+from shield.params import RSSParams
+from shield.right_of_way import can_stop_before
+
+STOP, GO = 1, 2  # kinds of plans
+KNOWN, STRAIGHT, ANY = range(3)  # what is known of the ways that others take: see `INTENTS`
+INTENTS = ("known", "straight", "any")
+NEVER = 1 << 30  # frame of something that does not happen
+_SHORT_CUT = 1.0  # a car that cuts the corners of its path gains or loses at most this ...
+_SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
+_REVERSE = 1.0  # a car that reverses may go on for this long [s]
+_TAIL = 3  # frames between two moments at which a go plan may begin to brake
+_LONGEST = 10.0  # throttle phase of a plan, at most [s]
+_BODIES = 8.0  # cars that follow each other are in each other's way that far apart, margins included [m]
+_CHANGE = 1.0  # a lane change is over after that [s]
+_REST = 1e-9  # below this speed a plan has come to rest [m/s]
+
+# One way that a road user may take. SI units.
+THREAT = np.dtype(
+    [
+        ("user", "i8"),  # index of the road user, -1 = nobody: a red light
+        ("path", "i8"),  # row in `Paths`; -1 = an obstacle off all paths
+        ("s", "f8"),  # arc length of the centre on that path
+        ("v", "f8"),  # speed, negative in reverse
+        ("cap", "f8"),  # speed above which it does not accelerate
+        ("half_length", "f8"),
+        ("wreck", "?"),  # has crashed: it may stop on the spot
+        ("priority", "i8"),  # +1: the ego has the right of way over it, -1: the other way round
+        ("red_for", "f8"),  # it is counted on to wait at a light for this long [s]; 0 = it is not
+        ("line", "f8"),  # and until then its centre stays behind this arc length [m]
+        ("ignored", "?"),  # behind the ego on its lane, or obliged and able to give way
+        ("left_out", "?"),  # the ego's plans are not checked against it: see `shield.examined`
+        ("stops_here", "?"),  # who is behind it on its approach is not looked at
+        ("left", "i8"),  # frame of the plan from which on it is a follower
+        ("tail", "i8"),  # likewise while a plan brakes
+        ("from_cell", "i8"),  # cells of the ego's path in the way of an obstacle
+        ("to_cell", "i8"),
+    ],
+    align=True,
+)
+
+
+class Track(NamedTuple):
+    """Where the ego is on its path."""
+
+    path: int
+    s: float  # arc length of the centre [m]
+    v: float  # speed [m/s]
+    half_length: float
+    beside: int  # path of the lane that it is leaving for this one, -1 = none
+    shift: float  # arc length on that path, less s [m]
+
+
+class Scene(NamedTuple):
+    """Everything that a plan depends on. M ways of others."""
+
+    paths: Paths
+    track: Track
+    threats: np.ndarray  # `[M]` THREAT
+    ego: RSSParams
+    other: RSSParams
+    dt: float  # length of a frame [s]
+
+
+# ---------------------------------------------------------------- where others may be
+
+
+@merged
+def nearest(threat, t, other):
+    """Least arc length at which a road user can be `t` from now [m]."""
+    if threat.wreck:
+        return threat.s
+    if threat.v < 0.0:
+        return threat.s + threat.v * min(t, _REVERSE)
+    driven = travel(t, threat.v, 0.0, 0.0, other.a_max_brake)
+    return threat.s + driven - _short_cut(driven)
+
+
+@merged
+def farthest(threat, t, other):
+    """Largest arc length at which it can be `t` from now [m]."""
+    if threat.wreck:
+        return threat.s + max(threat.v, 0.0)  # a wreck rolls to rest with a time constant of 1 s
+    driven = response_distance(max(threat.v, 0.0), t, other.a_max_accel, threat.cap)
+    if threat.red_for > 0.0:
+        driven = min(driven, threat.line - threat.s + _beyond_line(max(t - threat.red_for, 0.0), other))
+    return threat.s + driven + _short_cut(driven)
+
+
+@merged
+def _beyond_line(t, other):
+    """How far behind a stop line a car can be `t` after it may go, if until then it was able to stop there [m].
+
+    With v = sqrt(2 b d) at a distance d it comes to v t + a t^2 / 2 - d, at most when v = b t.
+    """
+    return 0.5 * (other.a_max_accel + other.a_min_brake) * t**2
+
+
+@merged
+def _short_cut(driven):
+    """How far progress along a path may differ from the distance driven [m]."""
+    return min(_SHORT_CUT_SHARE * driven, _SHORT_CUT)
+
+
+@merged
+def fastest(threat, t, other):
+    """Largest speed it can have `t` from now [m/s]."""
+    return max(threat.v, min(threat.v + other.a_max_accel * t, threat.cap), 0.0)
+
+
+# ---------------------------------------------------------------- the ego and one of them
+
+
+@merged
+def follows(scene, s, v, threat, t):
+    """Would a road user be behind the ego, at `s` with speed `v`, on its lane by then, at a safe distance (Lemma 2)?"""
+    if threat.path < 0 or threat.wreck:
+        return False
+    track, other = scene.track, scene.other
+    s_other = on_path_of_ego(scene.paths, track.path, s, threat, farthest(threat, t, other))
+    gap = s - track.half_length - threat.half_length - s_other
+    return gap > 0.0 and gap >= distance_behind(threat, fastest(threat, t, other), v, other)
+
+
+@merged
+def distance_behind(threat, v_threat, v, other):
+    """Distance that a follower has to keep (Lemma 2) [m]; beyond the speed limit it does not accelerate."""
+    rear = RSSParams(
+        other.response_time,
+        other.a_max_accel,
+        other.a_min_brake,
+        other.a_max_brake,
+        other.a_min_brake_correct,
+        other.a_lat_max_accel,
+        other.a_lat_min_brake,
+        other.mu,
+        other.standstill_gap,
+        min(other.v_cap, threat.cap),
+    )
+    return d_min_following(v_threat, v, rear, other)
+
+
+@merged
+def on_path_of_ego(paths, path, s, threat, s_threat):
+    """Arc length of a road user as the ego counts it, inf where it does not drive along the ego's lane [m]."""
+    lane = paths.lane[path, cell_of(s, paths.cells[path])]
+    offset = paths.offset[threat.path, lane]
+    if np.isnan(offset):
+        return np.inf
+    s_other = s_threat - offset + paths.offset[path, lane]
+    return s_other if s_other >= s or _comes_from_behind(paths, path, s, threat, s_threat, s - s_other) else np.inf
+
+
+@merged
+def _comes_from_behind(paths, path, s, threat, s_threat, distance):
+    """Does a road user at `distance` [m] behind the ego not come in its way before? On a ring everybody is behind."""
+    return paths.first[path, threat.path, cell_of(s, paths.cells[path])] - s_threat >= distance - _BODIES
+
+
+@merged
+def behind_by(paths, track, threat):
+    """How far a road user on the ego's own way is behind it; -inf if it is not on it [m]."""
+    lane = paths.lane[threat.path, cell_of(threat.s, paths.cells[threat.path])]
+    offset = paths.offset[track.path, lane]
+    if np.isnan(offset):
+        return -np.inf
+    distance = track.s - (threat.s - paths.offset[threat.path, lane] + offset)
+    clear = _comes_from_behind(paths, track.path, track.s, threat, threat.s, distance)
+    return distance if distance <= 0.0 or clear else -np.inf
+
+
+@merged
+def meets(scene, s, slack, threat, t, resting):
+    """Can a road user be in the way of the ego at `s`, at time `t` from now or, if it rests, ever after?
+
+    With a `slack` [m], the ego may be that much further or less far than at `s`.
+    """
+    paths, track = scene.paths, scene.track
+    first, last = cell_of(s - slack, paths.cells[track.path]), cell_of(s + slack, paths.cells[track.path])
+    if threat.path < 0:
+        return threat.from_cell <= last and first <= threat.to_cell
+    low, high = nearest(threat, t, scene.other), np.inf if resting else farthest(threat, t, scene.other)
+    for i in range(first, last + 1):
+        if in_conflict(paths, track.path, i, threat.path, low, high):
+            return True
+    if track.beside >= 0 and t <= _CHANGE:
+        i = cell_of(s + track.shift, paths.cells[track.beside])
+        return in_conflict(paths, track.beside, i, threat.path, low, high)
+    return False
+
+
+@compiled
+def can_give_way(scene, threat):
+    """Can a road user stop before it comes in the way of the ego's path (Def. 17, item 1)?"""
+    if threat.path < 0:
+        return False
+    paths, track = scene.paths, scene.track
+    entry = paths.first[track.path, threat.path, cell_of(track.s, paths.cells[track.path])]
+    return can_stop_before(entry - CELL - threat.s, max(threat.v, 0.0), scene.other)
+
+
+# ---------------------------------------------------------------- plans
+
+
+@merged
+def step(s, v, a, dt):
+    """One frame of explicit Euler, never backwards."""
+    return s + v * dt, max(v + a * dt, 0.0)
+
+
+@merged
+def throttle(scene, s, v):
+    """Acceleration of a plan's throttle phase: up to the speed limit [m/s^2]."""
+    paths, path, ego = scene.paths, scene.track.path, scene.ego
+    cap = min(ego.v_cap, paths.speed_limit[path, cell_of(s, paths.cells[path])])
+    return min(ego.a_max_accel, max((cap - v) / scene.dt, 0.0))
+
+
+@compiled
+def _meets_anyone(scene, s, v, n, only, slack, resting, braking):
+    """Does the ego, at `s` with speed `v` on frame n of a plan, meet anyone (or road user `only`, if not -1)?
+
+    Whoever is a follower by then counts no more: for the rest of the plan, or of its tail if `braking`.
+    """
+    t = n * scene.dt
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        if threat.ignored or threat.left <= n or (threat.left_out if only < 0 else threat.user != only):
+            continue
+        if braking and threat.tail <= n:
+            continue
+        if follows(scene, s, v, threat, t):
+            if braking:
+                threat.tail = n
+            else:
+                threat.left = n
+        elif meets(scene, s, slack, threat, t, resting):
+            return True
+    return False
+
+
+@merged
+def begin(scene):
+    """Nobody has become a follower yet."""
+    for k in range(len(scene.threats)):
+        scene.threats[k].left = scene.threats[k].tail = NEVER
+
+
+@compiled
+def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
+    """First frame on which braking to rest from frame `n` meets somebody, `NEVER` if none.
+
+    Args:
+      scene: `Scene`.
+      s, v: the ego's on frame n.
+      brake: [m/s^2].
+      only: index of the road user that counts, -1 = all.
+      at_line: the ego may rest only where it is in nobody's way, whoever may come.
+      slack: how exactly the ego is known to follow the plan [m].
+    """
+    paths, path = scene.paths, scene.track.path
+    rest = s + v * scene.dt + stopping_distance(v, brake)
+    if at_line and paths.crossed[path, cell_of(rest, paths.cells[path])]:
+        return n
+    for k in range(len(scene.threats)):
+        scene.threats[k].tail = NEVER
+    while True:
+        resting = v <= _REST
+        if _meets_anyone(scene, s, v, n, only, slack, resting, True):
+            return n
+        if resting:
+            return NEVER
+        s, v = step(s, v, -brake, scene.dt)
+        n += 1
+
+
+@compiled
+def stop_conflict(scene, a, only, at_line, slack):
+    """First frame on which "this frame `a`, then brake" meets somebody, `NEVER` if none."""
+    begin(scene)
+    s, v = step(scene.track.s, scene.track.v, a, scene.dt)
+    return tail_conflict(scene, s, v, 1, scene.ego.a_min_brake, only, at_line, slack)
+
+
+@compiled
+def go_plan(scene, a, only, at_line, slack):
+    """Find a plan "this frame `a`, then throttle, then brake" that meets nobody.
+
+    Returns:
+      (frames of throttle, frame of the first conflict): frames = -1 if there is no such plan; then the
+      latest first conflict of all.
+    """
+    begin(scene)
+    s, v = step(scene.track.s, scene.track.v, a, scene.dt)
+    n, latest = 1, 0
+    while n * scene.dt < _LONGEST:
+        if _meets_anyone(scene, s, v, n, only, slack, False, False):
+            return -1, max(latest, n)
+        if n % _TAIL == 2:
+            conflict = tail_conflict(scene, s, v, n, scene.ego.a_min_brake, only, at_line, slack)
+            if conflict == NEVER:
+                return n - 1, NEVER
+            latest = max(latest, conflict)
+        s, v = step(s, v, throttle(scene, s, v), scene.dt)
+        n += 1
+    return -1, latest
+
+
+@compiled
+def plan_conflict(scene, go, only, slack):
+    """First frame on which "throttle for `go` frames, then brake" meets somebody, `NEVER` if none."""
+    begin(scene)
+    s, v = scene.track.s, scene.track.v
+    for n in range(go):
+        if n > 0 and _meets_anyone(scene, s, v, n, only, slack, False, False):
+            return n
+        s, v = step(s, v, throttle(scene, s, v), scene.dt)
+    return tail_conflict(scene, s, v, go, scene.ego.a_min_brake, only, False, slack)

@@ -1,0 +1,217 @@
+"""Plans through a junction (Def. 17 pointwise, Def. 18): nobody is ever in the ego's way, whatever it wants."""
+
+import numpy as np
+import pytest
+from junction_world import DT, EGO, TABLE, Duel, arms, crossing_pairs, junction
+
+from shield.blame import VERDICTS
+from shield.junction import ASSERTIVE, CAUTIOUS, PRIORITY, SAMPLE, judge_crossing
+from shield.plans import NEVER, Scene, Track, plan_conflict, stop_conflict
+
+STARTS = [(s, v) for s in (70.0, 88.0, 97.0) for v in (0.0, 9.0)]
+OTHERS = [(s, v) for s in (55.0, 80.0, 95.0) for v in (3.0, 9.0)]
+
+
+# as if others could stop at once: whom the ego counts on to give way is then counted on for too long
+HASTY = TABLE.other._replace(response_time=DT)
+
+
+def drive(duel, rng, other="any", frames=160, overrides=True):
+    """Play one duel; returns the frames in contact and the report's broken duties."""
+    contacts = broken = 0
+    nominal = a_other = 0.0
+    for t in range(frames):
+        if t % 8 == 0:
+            nominal = rng.choice([-6.0, 0.0, 6.0])
+            a_other = {"any": rng.choice([-6.0, 0.0, 6.0]), "throttle": 6.0}[other]
+        duel.frame(nominal, a_other, overrides)
+        broken += duel.report.broken
+        contacts += duel.touch()
+    return contacts, broken
+
+
+def duels(assumed=TABLE.other, **options):
+    """Contacts and broken duties over every pair of crossing paths and a grid of starts."""
+    contacts = broken = starts = trapped = 0
+    for n, (a, b) in enumerate(crossing_pairs()):
+        rng = np.random.default_rng(n)
+        for s, v in STARTS:
+            s_other, v_other = OTHERS[rng.integers(len(OTHERS))]
+            duel = Duel(a, b, s, v, s_other, v_other, CAUTIOUS, assumed)
+            duel.frame(0.0, 0.0)
+            if duel.report.trapped or duel.touch():
+                continue  # in danger from the start
+            starts += 1
+            found = drive(duel, rng, **options)
+            contacts += found[0] > 0
+            broken += found[1]
+            trapped += duel.report.trapped
+    return contacts, broken, starts, trapped
+
+
+def test_nobody_is_in_the_way_on_any_pair_of_crossing_paths():
+    contacts, broken, starts, trapped = duels()
+    assert starts > 100
+    assert (contacts, broken, trapped) == (0, 0, 0)
+
+
+def test_nor_when_the_other_never_lifts_its_foot():
+    assert duels(other="throttle")[:2] == (0, 0)
+
+
+def test_without_the_shield_they_meet():
+    assert duels(overrides=False)[0] > 10
+
+
+def test_whoever_trusts_that_nobody_accelerates_is_hit():
+    """Mutation: arrival times without the other's throttle (item 3' believed too late)."""
+    timid = TABLE.other._replace(a_max_accel=0.0)
+    assert duels(assumed=timid, other="throttle")[0] > 0
+
+
+def test_whoever_takes_the_right_of_way_is_hit_by_those_who_do_not_give_it():
+    """Items 2 and 3 as printed: everybody who can stop is expected to."""
+    contacts = 0
+    for a, b in crossing_pairs():
+        for s_other in range(60, 97, 3):
+            contacts += contact(Duel(a, b, 80.0, 9.0, s_other, 9.0, ASSERTIVE, HASTY), 6.0, 6.0, overrides=True)
+    assert contacts > 0
+
+
+def test_whoever_swaps_the_priority_is_hit():
+    """Mutation: the ego expects those to give way who have the right of way."""
+    paths = junction().roads.paths
+    lower = [(a, b) for a, b in crossing_pairs() if paths.priority[a, b] < 0]
+    contacts = 0
+    for a, b in lower:
+        for s_other in range(60, 97, 3):
+            duel = Duel(a, b, 80.0, 9.0, s_other, 9.0, PRIORITY, HASTY)
+            duel.threats["priority"] = 1
+            contacts += contact(duel, 6.0, 6.0, overrides=True)
+    assert contacts > 0
+
+
+def test_whoever_forgets_the_plan_is_hit():
+    """Mutation: where no new plan is found, the agent's wish is carried out instead of the plan in force."""
+    contacts = 0
+    for n, (a, b) in enumerate(crossing_pairs()):
+        duel = Duel(a, b, 88.0, 9.0, 80.0, 6.0)
+        rng, wish = np.random.default_rng(n), 0.0
+        for t in range(120):
+            wish = rng.choice([-6.0, 6.0]) if t % 8 == 0 else wish
+            before = duel.v
+            duel.frame(wish, 6.0)
+            duel.v = max(before + wish * DT, 0.0)
+            contacts += duel.touch()
+    assert contacts > 0
+
+
+def test_a_go_is_not_broken_off():
+    """Going on is a commitment: an ego that asks to brake inside the junction is carried through it."""
+    a, b = next((a, b) for a, b in crossing_pairs() if arms(a) == ("o0", "o1") and arms(b) == ("o1", "o3"))
+    duel = Duel(a, b, 104.0, 6.0, 30.0, 8.0)
+    gone = 0
+    for _ in range(110):
+        duel.frame(-3.0, 6.0)
+        gone += duel.report.acceleration > 0.0
+        assert not duel.touch()
+    assert gone > 0 and duel.s > 117.0  # out of the other path
+
+
+def test_waiting_cars_let_the_ego_go_when_they_are_assumed_to_stand():
+    a, b = crossing_pairs()[0]
+    duel = Duel(a, b, 97.0, 0.0, 60.0, 0.0)
+    for _ in range(120):
+        duel.frame(6.0, 0.0)
+    assert duel.s > 125.0 and not duel.touch()
+
+
+@pytest.mark.parametrize("v", [0.0, 3.0, 9.0])
+def test_behind_a_leader_a_plan_is_lemma_2(v):
+    """On one lane the plan "brake now" is clear iff the gap is at least d_min with no response time."""
+    roads = junction().roads
+    path = next(p for p in range(12) if arms(p) == ("o0", "o2"))
+    clear = []
+    for gap in np.arange(0.0, 20.0, 0.25):
+        duel = Duel(path, path, 20.0, v, 20.0 + 5.0 + gap, 6.0)
+        scene = Scene(roads.paths, Track(path, 20.0, v, 2.5, -1, 0.0), duel.threats, EGO, TABLE.other, DT)
+        clear.append(plan_conflict(scene, 0, -1, 0.0) == NEVER)
+    nearest = np.arange(0.0, 20.0, 0.25)[clear.index(True)]
+    d_min = max(v**2 / (2 * EGO.a_min_brake) - 6.0**2 / (2 * TABLE.other.a_max_brake), 0.0)
+    assert clear[clear.index(True) :] == [True] * (len(clear) - clear.index(True))
+    assert d_min <= nearest <= d_min + 2.5  # swept boxes, margins and cells
+
+
+def test_braking_earlier_never_makes_a_clear_stop_unclear():
+    rng = np.random.default_rng(1)
+    for a, b in crossing_pairs()[::3]:
+        duel = Duel(a, b, rng.uniform(60, 97), rng.uniform(0, 9), rng.uniform(40, 100), rng.uniform(0, 9))
+        track = Track(a, duel.s, duel.v, 2.5, -1, 0.0)
+        scene = Scene(duel.roads.paths, track, duel.threats, EGO, TABLE.other, DT)
+        if stop_conflict(scene, 3.0, -1, False, 0.0) == NEVER and duel.s < 99.0:
+            assert stop_conflict(scene, -3.0, -1, False, 0.0) == NEVER
+
+
+# ---------------------------------------------------------------- blame
+
+
+def verdict_of(duel, speed):
+    sample = np.zeros(1, SAMPLE)[0]
+    sample["speed"] = speed
+    return VERDICTS[judge_crossing(sample, duel.memory[0], TABLE.other, DT).verdict]
+
+
+def contact(duel, nominal, a_other, overrides):
+    for _ in range(200):
+        duel.frame(nominal, a_other, overrides)
+        if duel.touch():
+            return True
+    return False
+
+
+def test_an_ego_that_drives_into_a_crossing_car_is_to_blame():
+    for a, b in crossing_pairs():
+        duel = Duel(a, b, 80.0, 9.0, 80.0, 9.0)
+        if contact(duel, 0.0, 0.0, overrides=False):
+            assert verdict_of(duel, float(duel.threats["v"][0])) == "ego"
+            return
+    pytest.fail("no contact")
+
+
+def test_a_car_that_beats_its_bounds_is_to_blame():
+    found = []
+    for a, b in crossing_pairs():
+        for s_other in (45.0, 55.0, 65.0):
+            duel = Duel(a, b, 90.0, 6.0, s_other, 8.0)
+            for t in range(90):
+                duel.frame(6.0, 0.0)
+                if duel.report.acceleration > 0.0 and duel.s > 99.0 and t > 3:
+                    duel.threats["v"] = 25.0  # it jumps to a speed that nobody expects
+                    break
+            for _ in range(60):
+                duel.frame(6.0, 0.0)
+                if duel.touch():
+                    found.append(verdict_of(duel, float(duel.threats["v"][0])))
+                    break
+    assert found and set(found) <= {"other"}
+
+
+def test_a_car_that_was_counted_on_to_give_way_is_to_blame_when_it_does_not():
+    found = []
+    for a, b in crossing_pairs():
+        if junction().roads.paths.priority[a, b] <= 0:
+            continue
+        for s_other in range(60, 97, 3):
+            duel = Duel(a, b, 80.0, 9.0, s_other, 9.0, PRIORITY, HASTY)
+            if contact(duel, 6.0, 6.0, overrides=True):
+                found.append(verdict_of(duel, float(duel.threats["v"][0])))
+    assert found and set(found) == {"other"}
+
+
+def test_danger_that_was_there_at_first_sight_is_inherited():
+    a, b = crossing_pairs()[0]
+    paths = junction().roads.paths
+    i = int(np.flatnonzero(np.isfinite(paths.conflicts[a, b, :, 0]))[0])
+    duel = Duel(a, b, i * 0.5 - 2.0, 9.0, float(paths.conflicts[a, b, i, 0]) - 2.0, 9.0)
+    assert contact(duel, 0.0, 0.0, overrides=True)
+    assert verdict_of(duel, float(duel.threats["v"][0])) == "inherited"
