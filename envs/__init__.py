@@ -1,7 +1,8 @@
 """The shield on simulators."""
 
+from envs.multi_agent import MultiAgentShield
 from envs.scenarios import make
 from envs.vector import make_vec
 from envs.wrapper import ShieldWrapper
 
-__all__ = ["ShieldWrapper", "make", "make_vec"]
+__all__ = ["MultiAgentShield", "ShieldWrapper", "make", "make_vec"]

@@ -3,25 +3,32 @@
 import gymnasium as gym
 import highway_env  # noqa: F401  registers the environments
 
+import envs.signalised  # noqa: F401  registers another one
+from envs.multi_agent import MultiAgentShield, has_agents
 from envs.wrapper import ShieldWrapper
-from shield.params import PRESETS, Preset, RSSParams, Rules
+from shield.params import Preset, RSSParams, Rules
 
 
 def make(
     env_id: str,
     shield: str | None = "override",
-    params: Preset | tuple[RSSParams, RSSParams] = PRESETS["simulator"],
+    params: Preset | tuple[RSSParams, RSSParams] | None = None,
     rules: Rules = Rules(),
     intervention_penalty: float = 0.0,
     record: bool = False,
+    entry: str = "cautious",
+    intent: str = "any",
+    waiting: str = "line",
+    traffic: str = "stock",
+    examine: str = "table",
     **kwargs,
 ) -> gym.Env:
-    """`gymnasium.make` with a shield around it.
+    """`gymnasium.make` with a shield around it: `MultiAgentShield` for several agents, `ShieldWrapper` for one.
 
     Args:
-      env_id: "highway-fast-v0", "highway-v0", "two-way-v0", "merge-v0", "exit-v0", ...
+      env_id: "highway-fast-v0", "highway-v0", "two-way-v0", "merge-v0", "signalised-intersection-v0", ...
       shield: "override", "monitor", or None for the bare environment.
-      params, rules, intervention_penalty, record: see `ShieldWrapper`.
+      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine: see `ShieldWrapper`.
       kwargs: passed to `gymnasium.make`, e.g. `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:
@@ -29,12 +36,25 @@ def make(
     """
     if shield is not None and shield not in ("override", "monitor"):
         raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
+    if shield is None and traffic != "stock":
+        raise ValueError(f"traffic = {traffic!r}: expected 'stock' without a shield; use shield = 'monitor'")
     try:
         env = gym.make(env_id, **kwargs)
     except gym.error.Error as error:
         raise ValueError(f"env_id = {env_id!r}: {error}") from None
     if shield is None:
         return env
-    return ShieldWrapper(
-        env, mode=shield, params=params, intervention_penalty=intervention_penalty, rules=rules, record=record
+    wrapper = MultiAgentShield if has_agents(env.unwrapped) else ShieldWrapper
+    return wrapper(
+        env,
+        mode=shield,
+        params=params,
+        intervention_penalty=intervention_penalty,
+        rules=rules,
+        record=record,
+        entry=entry,
+        intent=intent,
+        waiting=waiting,
+        traffic=traffic,
+        examine=examine,
     )

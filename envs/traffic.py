@@ -1,10 +1,20 @@
-"""Drivers for the other cars. Use: `make(..., config={"other_vehicles_type": RECKLESS})`."""
+"""Drivers for the other cars: reckless ones, and ones that keep every duty themselves.
+
+Reckless: `make(..., config={"other_vehicles_type": RECKLESS})`. Compliant: `make(..., traffic="compliant")`.
+"""
 
 import math
+from typing import Any
 
 from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.controller import ControlledVehicle
+
+from envs.highway import Settings, ShieldedEgo
+from envs.shielding import attach
+from shield.junction import PRIORITY
 
 RECKLESS = "envs.traffic.RecklessVehicle"
+TRAFFIC = ("stock", "compliant")
 
 
 class RecklessVehicle(IDMVehicle):
@@ -17,3 +27,26 @@ class RecklessVehicle(IDMVehicle):
     TIME_WANTED = 0.3  # time gap [s]
     LANE_CHANGE_MIN_ACC_GAIN = -math.inf  # [m/s^2]
     LANE_CHANGE_MAX_BRAKING_IMPOSED = math.inf  # [m/s^2]
+
+
+def shield_everybody(road: Any, drivers: list[ShieldedEgo], settings: Settings) -> list[ShieldedEgo]:
+    """Compliant traffic: a shield for every car that has none yet.
+
+    Where everybody keeps their duties there are no crashes (Lemmas 5 and 6), apart from dangers that cars
+    appear in. At junctions these drivers expect way only of who must give it and still can (Def. 17, item 1):
+    the right of way breaks the tie, and of two equal roads nobody relies on the other.
+
+    Cars may appear at any time, so this is called at reset and before every step.
+
+    Args:
+      road: highway-env's road.
+      drivers: shields of all cars so far; those of cars that have left without a contact are dropped.
+      settings: of the ego; its duties hold for everybody.
+
+    Returns:
+      Shields of all cars but those that had one before.
+    """
+    duties = settings._replace(overrides=True, entry=PRIORITY)
+    stay = [driver for driver in drivers if driver.contact or driver.vehicle in road.vehicles]
+    unshielded = [v for v in road.vehicles if isinstance(v, ControlledVehicle) and "act" not in vars(v)]
+    return stay + [attach(vehicle, duties) for vehicle in unshielded]

@@ -40,6 +40,7 @@ class FakeEnv(gym.Env):
         return {
             "speed": 20.0 + self.t,
             "crashed": blame == "ego",  # the simulator's flag misses the inherited ones
+            "time": self.t / 2,
             "blame": blame,
             "blame_evidence": {"partner": np.int64(4), "excess": 0.5} if blame else {},
             "override_share": self.braked / max(self.t, 1),
@@ -48,6 +49,13 @@ class FakeEnv(gym.Env):
             "episode_broken_duties": int(bool(blame)),
             "min_ttc": 100.0 - self.t,
         }
+
+
+class FakeEnvWithGoal(FakeEnv):
+    """The same road with a goal at its end."""
+
+    def _info(self, blame: str) -> dict[str, Any]:
+        return super()._info(blame) | {"is_success": self.t >= 7}
 
 
 def fake_vec(num_envs: int, autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP) -> SyncVectorEnv:

@@ -1,0 +1,158 @@
+"""MultiAgentShield: several controlled vehicles, each with a shield of its own."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import RecordConstructorArgs
+from highway_env.envs.common.action import MultiAgentAction
+
+from envs.highway import Frame, Settings, ShieldedEgo, log_of
+from envs.shielding import attach, begin_step, end_step, info_of
+from envs.traffic import shield_everybody
+from envs.wrapper import (
+    check_action_type,
+    check_conduct,
+    check_kind,
+    check_options,
+    check_params,
+    settings_for,
+    traffic_info,
+)
+from shield.blame import Audit, audit
+from shield.params import Preset, RSSParams, Rules
+
+
+class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
+    """`ShieldWrapper` for environments with several agents: each ego has its own shield and sees the others as cars.
+
+    Actions, observations, rewards and ends are the environment's: tuples, or one value for all. Every info has
+
+      agents: for each agent in turn a dict with the keys that `ShieldWrapper` writes: `shield`, `cost`, `blame`,
+        ... Blame is from the agent's own view: where two agents touch, "other" may be the other agent.
+      raw_reward: the environment's own reward or rewards (after a step).
+      traffic_blame: see `ShieldWrapper`; the agents are not among the others.
+
+    Args:
+      env: a highway-env environment with `MultiAgentAction`, such as intersection-multi-agent-v0/-v1/-v2.
+      intervention_penalty: subtracted from each agent's reward, times its own `override_fraction`; from one
+        reward for all, times the mean of these fractions.
+      mode, params, rules, record, entry, intent, waiting, traffic, examine: see `ShieldWrapper`.
+
+    Raises:
+      ValueError: as `ShieldWrapper`.
+    """
+
+    def __init__(
+        self,
+        env: gym.Env,
+        mode: str = "override",
+        params: Preset | tuple[RSSParams, RSSParams] | None = None,
+        intervention_penalty: float = 0.0,
+        rules: Rules = Rules(),
+        record: bool = False,
+        entry: str = "cautious",
+        intent: str = "any",
+        waiting: str = "line",
+        traffic: str = "stock",
+        examine: str = "table",
+    ) -> None:
+        RecordConstructorArgs.__init__(
+            self,
+            mode=mode,
+            params=params,
+            intervention_penalty=intervention_penalty,
+            rules=rules,
+            record=record,
+            entry=entry,
+            intent=intent,
+            waiting=waiting,
+            traffic=traffic,
+            examine=examine,
+        )
+        gym.Wrapper.__init__(self, env)
+        check_options(mode, intervention_penalty, traffic)
+        check_agents(env.unwrapped)
+        self.mode = mode
+        self.params = check_params(params, env.unwrapped)
+        self.conduct = check_conduct(entry, intent, waiting, examine)
+        self.rules = rules
+        self.intervention_penalty = float(intervention_penalty)
+        self.record = record
+        self.traffic = traffic
+        self._attach()
+
+    @property
+    def frames(self) -> tuple[list[Frame], ...]:
+        """Recorded frames of this episode so far, for each agent.
+
+        Raises:
+          ValueError: the wrapper was made without `record=True`.
+        """
+        if not self.record:
+            raise ValueError("record = False: expected True to keep the frames of an episode")
+        return tuple(ego.record or [] for ego in self._egos)
+
+    def audit(self) -> tuple[Audit, ...]:
+        """`ShieldWrapper.audit` for each agent. Needs `record=True`."""
+        of = self.settings
+        return tuple(audit(log_of(frames), of.ego, of.other, of.rules, of.dt) for frames in self.frames)
+
+    @property
+    def settings(self) -> Settings:
+        """The parameter table in force for every agent, response times rounded up to whole frames."""
+        return self._settings
+
+    @property
+    def drivers(self) -> list[ShieldedEgo]:
+        """Shields of the cars that are no agents, in compliant traffic."""
+        return self._drivers
+
+    def reset(self, *, seed=None, options=None):
+        observation, info = self.env.reset(seed=seed, options=options)
+        check_agents(self.env.unwrapped)
+        self._attach()
+        info.update(agents=tuple(info_of(ego) for ego in self._egos), **traffic_info(self))
+        return observation, info
+
+    def step(self, action):
+        self._welcome()
+        had_contact = [begin_step(ego) for ego in self._egos]
+        reward: Any
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        agents = tuple(end_step(*one) for one in zip(self._egos, had_contact, action, strict=True))
+        info.update(agents=agents, raw_reward=reward, **traffic_info(self))
+        if self.intervention_penalty > 0.0:
+            overridden = [agent["shield"]["override_fraction"] for agent in agents]
+            if isinstance(reward, tuple):
+                reward = tuple(r - self.intervention_penalty * f for r, f in zip(reward, overridden, strict=True))
+            else:
+                reward = reward - self.intervention_penalty * np.mean(overridden)
+        return observation, reward, terminated, truncated, info
+
+    def _attach(self) -> None:
+        env: Any = self.env.unwrapped
+        self._settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
+        self._egos = [attach(vehicle, self._settings, self.record) for vehicle in env.controlled_vehicles]
+        self._drivers: list[ShieldedEgo] = []
+        self._welcome()
+
+    def _welcome(self) -> None:
+        """Shield the cars that have come since the last step."""
+        if self.traffic == "compliant":
+            env: Any = self.env.unwrapped
+            self._drivers = shield_everybody(env.road, self._drivers, self.settings)
+
+
+def has_agents(env: Any) -> bool:
+    """Does an environment take one action for each of several agents?"""
+    return isinstance(getattr(env, "action_type", None), MultiAgentAction)
+
+
+def check_agents(env: Any) -> None:
+    """Can every agent of an environment be shielded?"""
+    check_kind(env)
+    if not has_agents(env):
+        raise ValueError(f"action type {type(env.action_type).__name__} is for one agent; expected MultiAgentAction")
+    for action_type in env.action_type.agents_action_types:
+        check_action_type(action_type, env)
