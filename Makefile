@@ -7,18 +7,26 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 
 ARGS        ?=
+ENVS        ?= highway-fast-v0 intersection-v0
+# a decision where roads cross costs several times one on a motorway
+BUDGET_intersection-v0 := --total-timesteps 50000
 PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
-.PHONY: help compare test bench evidence check clean
+.NOTPARALLEL:
+.PHONY: help compare $(ENVS:%=compare-%) test bench evidence check clean
 
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
 	@echo
-	@echo "  PYTHON=$(PYTHON) makes the environment; ARGS='--total-timesteps 1000000' goes to train.py."
+	@echo "  PYTHON=$(PYTHON) makes the environment; ARGS='--total-timesteps 1000000' goes to train.py;"
+	@echo "  ENVS='highway-fast-v0 intersection-v0' are the environments of compare."
 
-compare: $(VENV)/installed  ## train and compare shielded with unshielded PPO (minutes)
-	$(BIN)/python train.py $(ARGS)
+compare: $(ENVS:%=compare-%)  ## train and compare shielded with unshielded PPO (minutes)
+
+# one run per environment, each in a folder of its own; what ARGS says comes last and wins
+$(ENVS:%=compare-%): compare-%: $(VENV)/installed
+	$(BIN)/python train.py --env-id $* $(BUDGET_$*) $(ARGS)
 
 test: $(VENV)/installed-dev  ## run every test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)

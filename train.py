@@ -9,7 +9,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,13 +19,17 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 import envs
 from agents.ppo import available_devices, load_policy, rounded_timesteps, train
+from envs.highway import PLANS
 from envs.vector import BACKENDS
+from envs.wrapper import WAITING, default_preset, scheme_of
 from eval.jobs import Job, run_jobs
 from eval.replay import chosen, replay
 from eval.report import cell_path, read_cell, replay_path, write_cell, write_report
 from eval.rollout import evaluate
 from eval.run_folder import open_run
+from shield.junction import ENTRIES
 from shield.params import PRESETS, Preset, RSSParams, Rules
+from shield.plans import INTENTS
 
 TRAIN_MODE = {"unshielded": "monitor", "shielded": "override"}  # what the shield does in training
 TEST_MODE = {"off": "monitor", "on": "override"}  # a monitor assigns blame and changes nothing
@@ -42,6 +46,10 @@ examples:
       the same with more of everything
   python train.py --backend highway-env --total-timesteps 5376 --n-envs 2 --seeds 0 --eval-episodes 60
       on the original simulator, with much less of everything
+  python train.py --env-id intersection-v0 --total-timesteps 50000 --intent known
+      a junction, where the shield is told everybody's route
+  python train.py --env-id roundabout-v0 --entry priority --waiting anywhere
+      a ring, where others are expected to give way
   python train.py --env-id merge-v0 --preset slides
       another road, stricter assumptions
   python train.py --ego.response-time 0.5 --other.a-min-brake 4
@@ -85,13 +93,20 @@ class Config:
     """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 8192."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds; each trains every arm once."""
-    preset: str = "simulator"
-    """RSS parameters by name: simulator, slides, ad-rss, carla, rodionova-conservative,
-    rodionova-assertive."""
+    preset: str = "auto"
+    """RSS parameters by name: simulator, intersection, slides, ad-rss, carla, rodionova-conservative,
+    rodionova-assertive; auto: intersection at intersections, simulator elsewhere."""
     ego: Overrides = Overrides()
     """RSS parameters of the ego that replace the preset's."""
     other: Overrides = Overrides()
     """RSS parameters assumed of everybody else that replace the preset's."""
+    entry: str = "cautious"
+    """Whom the ego expects to give way where roads cross: cautious (nobody), priority (who must and still
+    can) or assertive (everybody who still can)."""
+    intent: str = "any"
+    """Which routes it expects of others there: known (theirs), straight, or any that fits."""
+    waiting: str = "line"
+    """Where it may wait there: at the line, or anywhere that is in the way of nobody who is there."""
     intervention_penalty: float = 0.0
     """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward."""
     eval_episodes: int = 1000
@@ -117,13 +132,20 @@ class Config:
 def main(arguments: list[str]) -> None:
     config = parse(arguments)
     check(config)
+    name = config.name or run_name(config)
     try:
+        config = replace(config, preset=preset_name(config))
         preset = resolve(config)
         for mode in TEST_MODE.values():
-            original(config, preset, mode)().close()  # a bad value shows now
+            env = original(config, preset, mode)()  # a bad value shows now
+            env.close()
+            if not isinstance(env.action_space, gym.spaces.Discrete):
+                raise ValueError(f"env_id = {config.env_id!r}: actions {env.action_space}; expected Discrete ones")
         batch(config, preset, "override", n_envs=1).reset(seed=0)  # and the engine is compiled once for all workers
-        folder = config.runs_dir / (config.name or run_name(config))
-        changes = open_run(folder, record(config, preset), resume=config.resume, overwrite=config.overwrite)
+        folder = config.runs_dir / name
+        changes = open_run(
+            folder, record(config, preset, scheme_of(env.unwrapped)), resume=config.resume, overwrite=config.overwrite
+        )
     except (ValueError, OSError) as error:
         fail(str(error))
     for change in changes:
@@ -145,12 +167,18 @@ def main(arguments: list[str]) -> None:
 
 def original(config: Config, preset: Preset, mode: str) -> Callable[..., gym.Env]:
     """Builds an environment of the original simulator."""
-    return functools.partial(envs.make, config.env_id, shield=mode, params=preset)
+    return functools.partial(envs.make, config.env_id, shield=mode, params=preset, **conduct(config))
 
 
 def batch(config: Config, preset: Preset, mode: str, n_envs: int, **options: Any) -> VectorEnv:
     """Environments of the chosen simulator side by side."""
-    return envs.make_vec(config.env_id, n_envs, shield=mode, backend=config.backend, params=preset, **options)
+    options |= {"backend": config.backend, "params": preset, **conduct(config)}
+    return envs.make_vec(config.env_id, n_envs, shield=mode, **options)
+
+
+def conduct(config: Config) -> dict[str, Any]:
+    """How the ego behaves where roads cross."""
+    return {"entry": config.entry, "intent": config.intent, "waiting": config.waiting}
 
 
 def model_path(folder: Path, arm: str, seed: int) -> Path:
@@ -221,13 +249,16 @@ def parse(arguments: list[str]) -> Config:
 
 def check(config: Config) -> None:
     """Refuse what is out of range, naming option, value and range. RSS parameters: see `resolve`."""
-    arms, presets, devices = list(TRAIN_MODE), list(PRESETS), available_devices()
+    arms, presets, devices = list(TRAIN_MODE), ["auto", *PRESETS], available_devices()
     for option, good, expected in (
         ("backend", config.backend in BACKENDS, f"one of {', '.join(BACKENDS)}"),
         ("arms", is_set_of(config.arms, arms), f"one or more of {', '.join(arms)}"),
         ("total_timesteps", config.total_timesteps >= 1, "at least 1"),
         ("seeds", is_set_of(config.seeds, range(2**32)), "different whole numbers, 0 to 2**32 - 1"),
         ("preset", config.preset in presets, f"one of {', '.join(presets)}"),
+        ("entry", config.entry in ENTRIES, f"one of {', '.join(ENTRIES)}"),
+        ("intent", config.intent in INTENTS, f"one of {', '.join(INTENTS)}"),
+        ("waiting", config.waiting in WAITING, f"one of {', '.join(WAITING)}"),
         ("intervention_penalty", 0 <= config.intervention_penalty < math.inf, "a number >= 0"),
         ("eval_episodes", config.eval_episodes >= 1, "at least 1"),
         ("replay_episodes", config.replay_episodes >= 0, "at least 0"),
@@ -248,9 +279,18 @@ def is_set_of(values: tuple, accepted: Sequence) -> bool:
     return 0 < len(values) == len(set(values)) and all(value in accepted for value in values)
 
 
+def preset_name(config: Config) -> str:
+    """The preset asked for, or the one of the environment."""
+    if config.preset != "auto":
+        return config.preset
+    env = envs.make(config.env_id, shield=None)
+    env.close()
+    return default_preset(env.unwrapped)
+
+
 def resolve(config: Config) -> Preset:
     """The preset with the parameters given on the command line put in."""
-    preset = PRESETS[config.preset]
+    preset = PRESETS[preset_name(config)]
     given = {"ego": _given(config.ego), "other": _given(config.other)}
     for side, values in given.items():
         try:
@@ -263,7 +303,7 @@ def resolve(config: Config) -> Preset:
     return preset
 
 
-def record(config: Config, preset: Preset) -> dict[str, Any]:
+def record(config: Config, preset: Preset, scheme: int) -> dict[str, Any]:
     """All that the result depends on: every option but those that only say where and how to start."""
     options = {f.name: getattr(config, f.name) for f in fields(config) if f.name not in _NOT_RECORDED}
     parameters = {"ego": preset.ego._asdict(), "other": preset.other._asdict()}
@@ -272,6 +312,7 @@ def record(config: Config, preset: Preset) -> dict[str, Any]:
             **parameters,
             "per_frame": preset.per_frame,
             "source": preset.source,
+            "roads_cross": scheme == PLANS,  # otherwise entry, intent and waiting change nothing
             "rules": Rules()._asdict(),  # the margins of the published table
         }
     }

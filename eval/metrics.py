@@ -3,6 +3,7 @@
 A cell is a (train, test) pair: shield off or on while training, off or on while testing.
 """
 
+from collections.abc import Container
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -24,12 +25,15 @@ class Metric(NamedTuple):
     digits: int
 
 
+# The success rate and the time of the episodes that succeed belong to environments with a goal only.
 METRICS = (
     Metric("crash", "crash", "%", "rate", 100, 0),
     Metric("at_fault", "ego at fault", "%", "rate", 100, 0),
     Metric("other", "other at fault", "%", "rate", 100, 0),
     Metric("inherited", "inherited", "%", "rate", 100, 0),
     Metric("none", "none", "%", "rate", 100, 0),
+    Metric("success", "success", "%", "rate", 100, 0),
+    Metric("time_to_goal", "time to goal", "s", "mean", 1, 1),
     Metric("return", "return", "", "mean", 1, 1),
     Metric("speed", "speed", "m/s", "mean", 1, 1),
     Metric("length", "length", "steps", "mean", 1, 1),
@@ -39,7 +43,12 @@ METRICS = (
 
 
 def with_outcomes(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Add one 0/1 column per outcome: crash = at_fault + other + inherited + none."""
+    """Add one 0/1 column per outcome: crash = at_fault + other + inherited + none.
+
+    With a goal also time_to_goal [s], NaN in the episodes that do not reach it.
+    """
+    if "success" in episodes:
+        episodes = episodes.assign(time_to_goal=episodes["time"].where(episodes["success"].astype(bool)))
     blame, crash = episodes["blame"], episodes["crashed"].astype(bool)
     at_fault = blame.isin(["ego", "both"])
     return episodes.assign(
@@ -51,8 +60,13 @@ def with_outcomes(episodes: pd.DataFrame) -> pd.DataFrame:
     )
 
 
+def metrics_in(names: Container[str]) -> list[Metric]:
+    """The metrics that some episodes, or a summary of them, have."""
+    return [metric for metric in METRICS if metric.name in names]
+
+
 def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Every metric of every cell with n and a 95 % interval.
+    """Every metric of every cell with a 95 % interval and n, the episodes that have it.
 
     Args:
       episodes: one row per episode; columns of `eval.rollout.run_episode` and train, test.
@@ -64,14 +78,17 @@ def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
     rng = np.random.default_rng(0)
     rows = []
     for (train, test), cell in with_outcomes(episodes).groupby(["train", "test"], sort=False):
-        for metric in METRICS:
-            interval = _statistic(metric, cell[metric.name].to_numpy(float), rng)
+        for metric in metrics_in(cell.columns):
+            sample = cell[metric.name].to_numpy(float)
+            interval = _statistic(metric, sample[~np.isnan(sample)], rng)
             rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict()})
     return pd.DataFrame(rows)
 
 
 def differences(episodes: pd.DataFrame) -> pd.DataFrame:
     """Every cell minus the first one, paired by training seed and episode seed; means of all metrics.
+
+    A pair counts where both of its episodes have the metric: times to the goal only where both reach it.
 
     Returns:
       Columns train, test, metric, value, low, high, n.
@@ -82,10 +99,11 @@ def differences(episodes: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for (train, test), cell in cells[1:]:
         pairs = cell.merge(cells[0][1], on=keys, suffixes=("", "_baseline"))
-        for metric in METRICS:
+        for metric in metrics_in(cell.columns):
             sample = pairs[metric.name].to_numpy(float)
             baseline = pairs[f"{metric.name}_baseline"].to_numpy(float)
-            interval = paired_difference(sample, baseline, rng)
+            known = ~np.isnan(sample - baseline)
+            interval = paired_difference(sample[known], baseline[known], rng)
             rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict()})
     return pd.DataFrame(rows, columns=["train", "test", "metric", *Interval._fields])
 

@@ -6,6 +6,7 @@
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from rich.console import Console
@@ -17,6 +18,7 @@ from eval.replay import compare, verdict
 from eval.table import print_table, write_table
 
 SHIELD = {"unshielded": "off", "shielded": "on"}  # arm -> shield while training
+_PLACE = {"line": "at the line", "anywhere": "anywhere"}
 
 
 def write_report(folder: Path) -> None:
@@ -60,13 +62,20 @@ def write_report(folder: Path) -> None:
     )
     n_seeds = f"{len(seeds)} training seed" + ("s" if len(seeds) > 1 else "")
     title = (
-        f"PPO on {config['env_id']}, RSS preset {config['preset']}, "
+        f"PPO on {config['env_id']}, RSS preset {config['preset']}, {_conduct(config)}"
         f"{config['total_timesteps']} timesteps per arm, {n_seeds}"
     )
     write_table(summary, folder, title, note)
     plot_learning_curve(curve, folder, str(config["env_id"]))
     plot_blame(episodes, folder, str(config["env_id"]))
     print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160), note)
+
+
+def _conduct(config: dict[str, Any]) -> str:
+    """How the ego behaves where roads cross; empty where none do."""
+    if not config["parameters"].get("roads_cross"):
+        return ""
+    return f"{config['entry']} entry, {config['intent']} intent, waiting {_PLACE[config['waiting']]}, "
 
 
 def cell_path(folder: Path, arm: str, seed: int, test: str) -> Path:

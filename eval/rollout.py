@@ -20,6 +20,7 @@ def evaluate(
     n_envs: int = 1,
     keep_actions: bool = True,
     progress: Callable[[int], None] = lambda episodes: None,
+    more: Callable[[Any, int], dict[str, Any]] = lambda env, e: {},
 ) -> pd.DataFrame:
     """Play exactly one episode per seed, several side by side.
 
@@ -34,6 +35,7 @@ def evaluate(
       n_envs: E.
       keep_actions: fill the column "actions"; they must be whole numbers.
       progress: called with the episodes done so far.
+      more: further columns, of environment `e` of `env`, whose episode has just ended.
 
     Returns:
       One row per episode, in the order of `seeds`; columns as in `run_episode`, and actions: the
@@ -61,7 +63,7 @@ def evaluate(
             for e in np.flatnonzero(ended).tolist():
                 if playing[e] < len(seeds):
                     record = _record(seeds[playing[e]], returns[e], speeds[e], int(lengths[e]), _info(infos, e))
-                    records[playing[e]] = record | {"actions": " ".join(map(str, actions[e]))}
+                    records[playing[e]] = record | {"actions": " ".join(map(str, actions[e]))} | more(env, e)
                 playing[e] = next(upcoming)
                 returns[e], speeds[e], lengths[e], actions[e] = 0.0, 0.0, 0, []
             progress(len(records))
@@ -77,9 +79,10 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
 
     seed; return; length [decisions]; speed: mean of info["speed"] [m/s]; crashed: the car touched
     somebody; env_crashed: the simulator's own flag; blame: ego, both, other, inherited, none or
-    empty; inherited: blame is "inherited"; cost: sum; override_share: of the simulation frames;
-    dangerous_pairs, broken_duties: pair-frames in danger, and those on which the car broke its duty;
-    min_ttc: smallest time to collision [s]; evidence: the verdict's grounds as JSON.
+    empty; inherited: blame is "inherited"; time: how long the episode lasted [s]; success: the car has
+    reached its goal untouched (no such column where there is no goal); cost: sum; override_share: of
+    the simulation frames; dangerous_pairs, broken_duties: pair-frames in danger, and those on which the
+    car broke its duty; min_ttc: smallest time to collision [s]; evidence: the verdict's grounds as JSON.
     """
     env = make_env()
     try:
@@ -100,12 +103,16 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
 def _record(seed: int, total_reward: float, total_speed: float, length: int, info: dict[str, Any]) -> dict[str, Any]:
     """The record of an episode from its sums and its last info."""
     blame = str(info["blame"])
+    crashed = bool(blame) or bool(info["crashed"])
+    goal = {"success": bool(info["is_success"]) and not crashed} if "is_success" in info else {}
     return {
         "seed": int(seed),
         "return": float(total_reward),
         "length": length,
+        "time": float(info["time"]),
+        **goal,
         "speed": float(total_speed) / length,
-        "crashed": bool(blame) or bool(info["crashed"]),
+        "crashed": crashed,
         "env_crashed": bool(info["crashed"]),
         "blame": blame,
         "inherited": blame == "inherited",

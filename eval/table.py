@@ -9,13 +9,16 @@ from rich.console import Console
 from rich.table import Table
 
 from eval.files import atomic, write_text
-from eval.metrics import METRICS
+from eval.metrics import metrics_in
 
 LEGEND = (
     "train, test: shield off or on. crash (% of the n test episodes) = ego at fault + other at fault + inherited (the "
     "episode began in that danger) + none (unexplained: a bug). overridden: % of simulation frames. length: decisions. "
     "min TTC: smallest time to collision, median of the episodes. [low, high]: 95 % interval over test episodes (rates "
     "Wilson, others bootstrap); other training seeds may differ by more."
+)
+GOAL_LEGEND = (
+    " success: % of the n test episodes that reached the goal without a contact; time to goal: mean of those episodes."
 )
 
 
@@ -25,12 +28,17 @@ def table_frame(summary: pd.DataFrame) -> pd.DataFrame:
     for (train, test), cell in summary.groupby(["train", "test"], sort=False):
         cell = cell.set_index("metric")
         row = {"train": train, "test": test, "n": str(cell["n"].iloc[0])}
-        for metric in METRICS:
+        for metric in metrics_in(cell.index):
             heading = f"{metric.label} [{metric.unit}]" if metric.unit else metric.label
             value, low, high = cell.loc[metric.name, ["value", "low", "high"]].to_numpy(float) * metric.scale
             row[heading] = with_interval(value, low, high, metric.digits)
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def legend(summary: pd.DataFrame) -> str:
+    """What the columns mean."""
+    return LEGEND + GOAL_LEGEND * ("success" in set(summary["metric"]))
 
 
 def with_interval(value: float, low: float, high: float, digits: int) -> str:
@@ -51,7 +59,7 @@ def write_table(summary: pd.DataFrame, folder: Path, title: str, note: str = "")
     with atomic(folder / "table.txt") as temporary, open(temporary, "w", encoding="utf-8") as stream:
         print_table(summary, title, Console(file=stream, width=160), note)
     below = f"\n\n{note}" if note else ""
-    write_text(folder / "table.md", f"{title}\n\n{_markdown(frame)}\n\n{LEGEND}{below}\n")
+    write_text(folder / "table.md", f"{title}\n\n{_markdown(frame)}\n\n{legend(summary)}{below}\n")
     write_text(folder / "table.tex", _latex(frame))
     with atomic(folder / "table.csv") as temporary:
         summary.to_csv(temporary, index=False)
@@ -62,12 +70,12 @@ def print_table(summary: pd.DataFrame, title: str, console: Console, note: str =
     frame = table_frame(summary)
     table = _rich(frame, title)
     unbounded = console.options.update(max_width=10_000)
-    if console.measure(table, options=unbounded).minimum > console.width:
+    if console.measure(table, options=unbounded).maximum > console.width:
         cells = frame["train"] + " / " + frame["test"]
         turned = frame.drop(columns=["train", "test"]).set_axis(cells).T
         table = _rich(turned.rename_axis("train / test", axis=0).reset_index(), title)
     console.print(table)
-    console.print(LEGEND, markup=False, highlight=False)
+    console.print(legend(summary), markup=False, highlight=False)
     if note:
         console.print("\n" + note, markup=False, highlight=False)
 

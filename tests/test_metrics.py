@@ -7,6 +7,7 @@ import pytest
 from eval.metrics import METRICS, differences, summarise, with_outcomes
 
 # (blame, crashed, simulator's own meaning): the six things that can happen
+OF_A_GOAL = ("success", "time_to_goal")
 OUTCOMES = ["", "ego", "both", "other", "inherited", "none"]
 
 
@@ -44,7 +45,7 @@ def test_a_crash_without_a_verdict_is_not_lost():
 
 def test_a_cell_is_summarised_by_hand_computed_values():
     summary = summarise(episodes_of(["ego", "both", "other", ""])).set_index("metric")
-    assert list(summary.index) == [metric.name for metric in METRICS]
+    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in OF_A_GOAL]
     expected = {
         "crash": 3 / 4,
         "at_fault": 2 / 4,
@@ -63,10 +64,39 @@ def test_a_cell_is_summarised_by_hand_computed_values():
     assert (summary["value"] <= summary["high"]).all()
 
 
+def crossings_of(times: list[float], successes: list[bool], test: str = "off") -> pd.DataFrame:
+    return episodes_of([""] * len(times), test=test).assign(time=times, success=successes)
+
+
+def test_the_time_to_the_goal_is_that_of_the_episodes_that_reach_it():
+    summary = summarise(crossings_of([6.0, 13.0, 8.0, 13.0], [True, False, True, False])).set_index("metric")
+    assert list(summary.index) == [metric.name for metric in METRICS]
+    assert summary.loc["success", ["value", "n"]].tolist() == [0.5, 4]
+    assert summary.loc["time_to_goal", ["value", "n"]].tolist() == [7.0, 2]  # mean of 6 and 8
+
+
+def test_where_nobody_reaches_the_goal_there_is_no_time_to_it():
+    summary = summarise(crossings_of([13.0] * 3, [False] * 3)).set_index("metric")
+    assert summary.loc["success", "value"] == 0
+    assert summary.loc["time_to_goal", "n"] == 0
+    assert summary.loc["time_to_goal", ["value", "low", "high"]].isna().all()
+
+
+def test_times_to_the_goal_are_compared_where_both_reach_it():
+    baseline = crossings_of([6.0, 13.0, 8.0, 7.0], [True, False, True, True])
+    changed = crossings_of([8.0, 9.0, 13.0, 9.0], [True, True, False, True], test="on")
+    result = differences(pd.concat([baseline, changed])).set_index("metric")
+    assert result.loc["time_to_goal", ["value", "n"]].tolist() == [2.0, 2]  # 8 - 6 and 9 - 7
+    assert result.loc["success", ["value", "n"]].tolist() == [0.0, 4]
+
+
 def test_cells_keep_their_order_and_the_same_episodes_give_the_same_summary():
     episodes = pd.concat([episodes_of(["ego"] * 5, "on", "off"), episodes_of([""] * 5, "off", "on")])
     first, second = summarise(episodes), summarise(episodes)
-    assert list(zip(first["train"], first["test"], strict=True))[:: len(METRICS)] == [("on", "off"), ("off", "on")]
+    assert list(zip(first["train"], first["test"], strict=True))[:: len(METRICS) - len(OF_A_GOAL)] == [
+        ("on", "off"),
+        ("off", "on"),
+    ]
     pd.testing.assert_frame_equal(first, second)
 
 

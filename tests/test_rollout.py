@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 
 import envs
 from eval.rollout import evaluate, run_episode
-from tests.fake_env import BRAKE, FakeEnv, brake, go, untouched_vec
+from tests.fake_env import BRAKE, FakeEnv, FakeEnvWithGoal, brake, go, untouched_vec
 
 
 def test_a_crash_is_recorded_with_its_numbers():
@@ -20,6 +20,7 @@ def test_a_crash_is_recorded_with_its_numbers():
         "seed": 6,
         "return": 10.0,  # 1 + 2 + 3 + 4
         "length": 4,
+        "time": 2.0,
         "speed": 22.5,  # mean of 21, 22, 23, 24
         "crashed": True,
         "env_crashed": True,
@@ -44,6 +45,38 @@ def test_an_episode_without_a_crash_runs_to_its_end():
     assert (record["length"], record["crashed"], record["blame"]) == (10, False, "")
     assert record["override_share"] == 1.0
     assert record["evidence"] == ""
+
+
+@pytest.mark.parametrize(
+    ("policy", "seed", "success"),
+    [
+        (brake, 4, True),  # ten decisions without a crash, and the goal lies at the seventh
+        (go, 4, False),  # crashes at decision 3 + 4 = 7, at the goal: arrived, but not untouched
+        (go, 3, False),  # crashes at decision 6, before it
+    ],
+)
+def test_success_is_a_goal_reached_untouched(policy, seed, success):
+    assert run_episode(FakeEnvWithGoal, policy, seed)["success"] is success
+
+
+def test_without_a_goal_nobody_succeeds_or_fails():
+    assert "success" not in run_episode(FakeEnv, brake, seed=4)
+    assert "success" not in evaluate(untouched_vec, brake, [4])
+
+
+def test_both_simulators_agree_on_who_gets_across_an_intersection_and_when():
+    def full_speed(observations):
+        return np.full(len(observations), 2)
+
+    make_vec = partial(envs.make_vec, "intersection-v0", shield="monitor", autoreset_mode=AutoresetMode.DISABLED)
+    columns = ["seed", "length", "time", "success", "crashed"]
+    engine, original = (
+        evaluate(partial(make_vec, backend=backend), full_speed, range(6), n_envs=2)[columns]
+        for backend in ("fast", "highway-env")
+    )
+    pd.testing.assert_frame_equal(engine, original)
+    assert set(engine["success"]) == {True, False}
+    assert engine["time"].equals(engine["length"] * 1.0)  # one decision a second
 
 
 def brake_late(observations):

@@ -50,6 +50,20 @@ def test_there_is_one_row_per_cell_and_one_column_per_metric(summary):
     assert frame["speed [m/s]"].iloc[0] == "25.0 [25.0, 25.0]"
 
 
+def test_success_and_the_time_to_the_goal_are_columns_where_there_is_a_goal(summary, tmp_path):
+    crossed = episodes_of([""] * 20).assign(time=7.0, success=True)
+    stuck = episodes_of([""] * 20, test="on").assign(time=13.0, success=False)
+    goal = summarise(pd.concat([crossed, stuck]))
+    frame = table_frame(goal)
+    assert frame["success [%]"].tolist() == ["100 [84, 100]", "0 [0, 16]"]
+    assert frame["time to goal [s]"].tolist() == ["7.0 [7.0, 7.0]", "–"]
+    assert frame["n"].tolist() == ["20", "20"]
+    write_table(goal, tmp_path, "A title")
+    assert "time to goal: mean of those episodes" in (tmp_path / "table.md").read_text()
+    assert "time to goal" not in printed(summary, 160)
+    assert all("…" not in printed(goal, width) for width in range(80, 180, 4))
+
+
 def test_a_wide_terminal_gets_the_cells_as_rows_with_nothing_cut_off(summary):
     text = printed(summary, 160)
     assert "…" not in text

@@ -44,7 +44,13 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--seeds", "--seeds  is out of range: expected different whole numbers, 0 to 2**32 - 1"),
         ("--seeds 1 1", "--seeds 1 1 is out of range: expected different whole numbers"),
         ("--seeds -1", "--seeds -1 is out of range: expected different whole numbers"),
-        ("--preset fast", "--preset fast is out of range: expected one of simulator, slides, ad-rss"),
+        (
+            "--preset fast",
+            "--preset fast is out of range: expected one of auto, simulator, intersection, slides, ad-rss",
+        ),
+        ("--entry bold", "--entry bold is out of range: expected one of cautious, priority, assertive"),
+        ("--intent left", "--intent left is out of range: expected one of known, straight, any"),
+        ("--waiting nowhere", "--waiting nowhere is out of range: expected one of line, anywhere"),
         ("--eval-episodes 0", "--eval-episodes 0 is out of range: expected at least 1"),
         ("--replay-episodes -1", "--replay-episodes -1 is out of range: expected at least 0"),
         ("--n-envs 0", "--n-envs 0 is out of range: expected 1 to 4096"),
@@ -56,7 +62,11 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--env-id no-such-road", "'no-such-road'"),
         ("--env-id CartPole-v1", "CartPole"),
         ("--env-id CartPole-v1 --backend highway-env", "CartPole"),
-        ("--env-id roundabout-v0", "environment RoundaboutEnv is not supported; expected one of highway-v0"),
+        (
+            "--env-id racetrack-v0 --backend highway-env",
+            "environment RacetrackEnv is not supported; expected one of highway-v0",
+        ),
+        ("--env-id intersection-multi-agent-v0 --backend highway-env", "actions Tuple(Discrete(3), Discrete(3)); "),
         ("--ego.mu -1", "--ego: mu = -1.0 is out of range: expected a finite number >= 0"),
         ("--other.a-min-brake 7", "--other: a_min_brake = 7 is out of range: expected at most a_max_brake = 6"),
         ("--ego.response-time 0.01", "response_time = 0.01 s of the ego is shorter than one simulation frame"),
@@ -94,6 +104,21 @@ def test_the_folder_is_named_after_the_options_that_are_not_defaults():
     assert script["run_name"](config(runs_dir=Path("elsewhere"), resume=True)) == "highway-fast-v0"
     chosen = config(env_id="merge-v0", seeds=(1, 2), ego=overrides(response_time=0.5))
     assert script["run_name"](chosen) == "merge-v0,seeds=1-2,ego.response_time=0.5"
+    crossing = config(env_id="intersection-v0", entry="priority", intent="known", waiting="anywhere")
+    assert script["run_name"](crossing) == "intersection-v0,entry=priority,intent=known,waiting=anywhere"
+
+
+@pytest.mark.parametrize(
+    ("env_id", "name"),
+    [("highway-fast-v0", "simulator"), ("roundabout-v0", "simulator"), ("intersection-v0", "intersection")],
+)
+def test_the_environment_chooses_the_preset_and_single_parameters_replace_its_values(env_id, name):
+    script = runpy.run_path(str(SCRIPT))
+    config, overrides, preset = script["Config"], script["Overrides"], script["PRESETS"][name]
+    assert script["preset_name"](config(env_id=env_id)) == name
+    assert script["preset_name"](config(env_id=env_id, preset="slides")) == "slides"
+    wobbly = script["resolve"](config(env_id=env_id, ego=overrides(mu=0.5)))
+    assert wobbly == preset._replace(ego=preset.ego._replace(mu=0.5))
 
 
 def test_given_parameters_replace_the_presets_and_nothing_else():
@@ -148,6 +173,9 @@ def test_a_run_writes_everything_a_paper_needs(finished):
     assert (folder / "shielded-seed0" / "model.zip").exists()
     config = json.loads((folder / "config.json").read_text())
     assert config["config"]["total_timesteps"] == 64
+    assert config["config"]["preset"] == "simulator"
+    assert [config["config"][name] for name in ("entry", "intent", "waiting")] == ["cautious", "any", "line"]
+    assert not config["config"]["parameters"]["roads_cross"]
     assert config["config"]["parameters"]["ego"]["a_max_brake"] == 6.0
     assert config["packages"]["torch"]
     for name in ("blame", "learning_curve"):
@@ -199,6 +227,20 @@ def test_the_original_simulator_is_one_flag_away(tmp_path):
     episodes = pd.read_csv(tmp_path / "original" / "episodes.csv", keep_default_na=False)
     assert list(zip(episodes["train"], episodes["test"], strict=True)) == CELLS
     assert not (tmp_path / "original" / "replays").exists()
+
+
+def test_a_run_at_a_junction_says_who_got_across_and_how_the_ego_behaved(tmp_path):
+    process = start(tmp_path, "--env-id", "intersection-v0", "--intent", "known", "--name", "junction")
+    output, _ = process.communicate(timeout=600)
+    assert process.returncode == 0, output
+    title = "RSS preset intersection, cautious entry, known intent, waiting at the line, 64 timesteps per arm"
+    assert title in " ".join(output.split())
+    assert "4 of 4 test episodes agree" in " ".join(output.split())
+    table = (tmp_path / "junction" / "table.md").read_text()
+    assert "| success [%] | time to goal [s] |" in table
+    config = json.loads((tmp_path / "junction" / "config.json").read_text())["config"]
+    assert (config["preset"], config["intent"]) == ("intersection", "known")
+    assert config["parameters"]["ego"]["a_max_accel"] == 6.0
 
 
 def test_a_run_killed_thrice_and_resumed_gives_the_same_episodes(finished, tmp_path):
