@@ -33,6 +33,7 @@ from eval.rollout import evaluate, run_episode
 from eval.stats import bootstrap_mean, wilson
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)
+AT_INTERSECTIONS = {SLOWER: 0, IDLE: 1, FASTER: 2}  # where nobody changes lanes
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
 SIDE_BY_SIDE = 1024  # environments in the engine
 
@@ -44,13 +45,20 @@ class Case(NamedTuple):
     policy: str
     episodes: int
     config: dict[str, Any]
+    options: dict[str, str] = {}  # noqa: RUF012  of `envs.make`, never changed
 
 
-def act(policy: str, rng: np.random.Generator) -> Any:
-    """The next action of a scripted policy."""
+def act(policy: str, rng: np.random.Generator, actions: int = 5) -> Any:
+    """The next action of a scripted policy.
+
+    Args:
+      actions: how many meta-actions there are.
+    """
+    if actions == 3 and policy in ("faster", "idle", "slower"):
+        return AT_INTERSECTIONS[act(policy, rng)]
     match policy:
         case "random":
-            return int(rng.integers(5))
+            return int(rng.integers(actions))
         case "faster":
             return FASTER
         case "idle":
@@ -66,18 +74,23 @@ def act(policy: str, rng: np.random.Generator) -> Any:
     raise ValueError(f"policy = {policy!r} is unknown")
 
 
-def act_batch(policy: str, rng: np.random.Generator, n: int) -> Any:
+def act_batch(policy: str, rng: np.random.Generator, n: int, actions: int = 5) -> Any:
     """The next actions of a scripted policy in n environments."""
     match policy:
         case "random":
-            return rng.integers(5, size=n)
+            return rng.integers(actions, size=n)
         case "lanes":
             return np.where(rng.random(n) < 0.5, LANE_LEFT, LANE_RIGHT)
         case "continuous":
             return rng.uniform(-1.0, 1.0, (n, 2)).astype(np.float32)
         case "full-throttle":
             return np.column_stack([np.ones(n), rng.uniform(-1.0, 1.0, n)]).astype(np.float32)
-    return np.full(n, act(policy, rng))
+    return np.full(n, act(policy, rng, actions))
+
+
+def actions(case: Case) -> int:
+    """How many meta-actions there are."""
+    return 3 if "intersection" in case.env_id else 5
 
 
 def _cases() -> dict[str, Case]:
@@ -95,6 +108,18 @@ def _cases() -> dict[str, Case]:
     cases["fast-lanes"] = Case("highway-fast-v0", "lanes", 100, {})
     cases["fast-continuous"] = Case("highway-fast-v0", "continuous", 100, CONTINUOUS)
     cases["fast-full-throttle"] = Case("highway-fast-v0", "full-throttle", 100, CONTINUOUS)
+    for name, env_id in (
+        ("intersection", "intersection-v0"),
+        ("intersection-v2", "intersection-v2"),
+        ("roundabout", "roundabout-v0"),
+        ("roundabout-v1", "roundabout-v1"),
+        ("merge-v1", "merge-v1"),
+        ("u-turn", "u-turn-v0"),
+    ):
+        for policy in ("random", "faster"):
+            cases[f"{name}-{policy}"] = Case(env_id, policy, 300, {})
+            if "intersection" in name or "roundabout" in name:
+                cases[f"{name}-{policy}-known"] = Case(env_id, policy, 300, {}, {"intent": "known"})
     reckless = {"other_vehicles_type": RECKLESS}
     cases["reckless-random"] = Case("highway-fast-v0", "random", 200, reckless)
     cases["reckless-full-throttle"] = Case("highway-fast-v0", "full-throttle", 200, reckless | CONTINUOUS)
@@ -121,7 +146,9 @@ def play(name: str, mode: str, seed: int) -> dict[str, Any]:
     case = CASES[name]
     rng = np.random.default_rng(seed)
     record = run_episode(
-        lambda: make(case.env_id, shield=mode, config=dict(case.config)), lambda _: act(case.policy, rng), seed
+        lambda: make(case.env_id, shield=mode, config=dict(case.config), **case.options),
+        lambda _: act(case.policy, rng, actions(case)),
+        seed,
     )
     return {"case": name, "mode": mode, **record}
 
@@ -156,13 +183,13 @@ def in_engine(name: str, mode: str, count: int, config: Config) -> pd.DataFrame:
     case, rng = CASES[name], np.random.default_rng(0)
 
     def make_batch(n: int) -> Any:
-        options = {"config": dict(case.config), "threads": config.n_workers}
+        options = {"config": dict(case.config), "threads": config.n_workers, **case.options}
         return make_vec(case.env_id, n, mode, autoreset_mode=AutoresetMode.DISABLED, **options)
 
     with progress_bar(count, name, "episode") as bar:
         frame = evaluate(
             make_batch,
-            lambda observations: act_batch(case.policy, rng, len(observations)),
+            lambda observations: act_batch(case.policy, rng, len(observations), actions(case)),
             range(count),
             n_envs=SIDE_BY_SIDE,
             keep_actions=False,

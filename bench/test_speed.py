@@ -27,7 +27,7 @@ class TimedEgo(ShieldedEgo):
     ("env_id", "steps"), [("highway-fast-v0", 60), ("highway-v0", 12)], ids=["20-vehicles", "50-vehicles"]
 )
 def test_cost_of_the_shield_per_frame(benchmark, env_id, steps, monkeypatch):
-    monkeypatch.setattr("envs.wrapper.ShieldedEgo", TimedEgo)
+    monkeypatch.setattr("envs.shielding.ShieldedEgo", TimedEgo)
     env = make(env_id)
     env.reset(seed=0)
     env.step(1)

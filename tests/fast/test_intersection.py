@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from highway_env.vehicle.behavior import IDMVehicle
+from lockstep import compare
 
 import envs
 from envs.fast.config import Unsupported, compile_scenario
