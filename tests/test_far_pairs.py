@@ -83,7 +83,7 @@ def test_memory_and_report_are_those_of_a_look_at_everybody(env_id):
 
 def replay(frames, settings):
     """What `shield_frame` remembers and reports over a log, and what a look at every pair gives."""
-    ego_params, other_params, rules, _, dt = settings
+    ego_params, other_params, rules, _, dt = settings[:5]
     count = len(frames[0].users)
     memory, thorough = np.zeros(count, MEMORY), np.zeros(count, MEMORY)
     last = np.zeros(count + 1, ROAD_USER)

@@ -39,6 +39,8 @@ def test_make_gives_every_agent_a_shield(env_id):
             assert set(agent) == set(keys) - {"speed", "crashed", "action", "rewards", "raw_reward"} - {
                 "agents_rewards",
                 "agents_terminated",
+                "is_success",
+                "time",
             }
             assert set(agent["shield"]) == set(keys["shield"])
     assert all("act" in vars(vehicle) for vehicle in env.unwrapped.controlled_vehicles)
