@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from envs.fast.network import LANE, compile_network, heading_at, local_coordinates
-from envs.paths import compile_paths, lead_of, successors_of, walks
+from envs.paths import beside, compile_paths, lead_of, successors_of, walks
 from shield.compiled import compiled
 from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y
 from shield.geometry import wrap_angle
@@ -53,6 +53,7 @@ class Roads(NamedTuple):
     limit: float  # highest speed limit of all lanes [m/s]
     lead: np.ndarray  # `[L]` how far before its start cars come to a lane [m]
     following: np.ndarray  # `[L]` each lane and those that follow, as sets of bits
+    beside: np.ndarray  # `[L]` each lane and those beside it, likewise
 
 
 def no_roads() -> Roads:
@@ -77,6 +78,7 @@ def no_roads() -> Roads:
         0.0,
         np.zeros(0),
         rows,
+        rows,
     )
 
 
@@ -92,7 +94,7 @@ class Junction:
         straight = [self._row(self._straightest(network, index)) for index in self.number]
         self._known: dict[tuple, int] = {}
         lanes = compile_network(network, False).lanes
-        self.lead, self.following = lead_of(network), successors_of(network)
+        self.lead, self.following, self.beside = lead_of(network), successors_of(network), beside(network)
         self.limit = float(lanes["speed_limit"].max())
         self._arrays = (compile_paths(network, self.limit), lanes, np.array(through), np.array(straight))
 
@@ -103,7 +105,7 @@ class Junction:
         choices = np.full((len(self._rows), max(map(len, self._rows))), -1)
         for row, numbers in enumerate(self._rows):
             choices[row, : len(numbers)] = numbers
-        return Roads(paths, lanes, choices, through, straight, self.limit, self.lead, self.following)
+        return Roads(paths, lanes, choices, through, straight, self.limit, self.lead, self.following, self.beside)
 
     def choice(self, index, route) -> int:
         """Row of the paths of a driver who heads for lane `index` with `route` ahead; a driver without a route: any."""
@@ -175,13 +177,15 @@ def track_of(roads, car, path):
 
 
 @compiled
-def list_threats(roads, track, cars, intent, v_cap, samples, threats, box):
+def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, box):
     """Ways that everybody else may take.
 
     Args:
       roads: `Roads`.
       track: `Track` of the ego.
       cars: `[N]` CAR_ON_ROAD, the others.
+      memory: `[N]` CROSSING: a car stays on lanes that lead on from where it was, though others fit too where
+        they meet.
       intent: KNOWN, STRAIGHT or ANY.
       v_cap: speed above which nobody accelerates, whatever the limit of the lane [m/s].
       samples: `[N]` SAMPLE, overwritten.
@@ -206,21 +210,42 @@ def list_threats(roads, track, cars, intent, v_cap, samples, threats, box):
                     count = _add(roads, track, car.on, roads.through[car.on], i, car, v_cap, threats, count)
                     samples[i].lanes |= 1 << car.on
             else:
+                lanes = _fitting(roads, car)
+                if memory[i].age > 0 and lanes & memory[i].reachable != 0:
+                    lanes &= memory[i].reachable
+                samples[i].lanes = lanes
                 for lane in range(len(roads.lanes)):
-                    if _fits(roads.lanes[lane], car, max(_BEYOND, roads.lead[lane]), _OFF, _TURNED):
-                        samples[i].lanes |= 1 << lane
+                    if lanes >> lane & 1:
                         row = roads.straight[lane] if intent == STRAIGHT else roads.through[lane]
                         count = _add(roads, track, lane, row, i, car, v_cap, threats, count)
-        samples[i].next_lanes = 0
-        for lane in range(len(roads.lanes)):
-            if samples[i].lanes >> lane & 1:
-                samples[i].next_lanes |= roads.following[lane]
+        samples[i].next_lanes = _joined(samples[i].lanes, roads.following)
+        samples[i].reachable = _joined(samples[i].next_lanes, roads.beside)
         if count == before:
             samples[i].astray = not car.wreck
             if count < len(threats):
                 _add_obstacle(roads, track, i, car, threats[count], box)
             count += 1
     return count
+
+
+@compiled
+def _fitting(roads, car):
+    """Lanes that a car may be driving on by its pose, as a set of bits."""
+    lanes = 0
+    for lane in range(len(roads.lanes)):
+        if _fits(roads.lanes[lane], car, max(_BEYOND, roads.lead[lane]), _OFF, _TURNED):
+            lanes |= 1 << lane
+    return lanes
+
+
+@compiled
+def _joined(lanes, sets):
+    """Union of the sets `[L]` of some lanes, all as bits."""
+    union = 0
+    for lane in range(len(sets)):
+        if lanes >> lane & 1:
+            union |= sets[lane]
+    return union
 
 
 @compiled

@@ -128,7 +128,7 @@ class JunctionEgo(ShieldedEgo):
         track = track_of(roads, cars[-1], self.path)
         self.path = track.path
         self.samples = np.zeros(len(self.others), SAMPLE)
-        common = (roads, track, cars[:-1], settings.intent, settings.other.v_cap, self.samples)
+        common = (roads, track, cars[:-1], self.crossings, settings.intent, settings.other.v_cap, self.samples)
         count = list_threats(*common, self.room, self.box)
         if count > len(self.room):
             self.room = np.zeros(2 * count, THREAT)

@@ -223,6 +223,12 @@ def successors_of(network) -> np.ndarray:
     return np.array([sum(1 << number[index] for index in {*group}) for group in lanes], np.int64)
 
 
+def beside(network) -> np.ndarray:
+    """Each lane and those beside it, as sets of bits `[L]`."""
+    number = {index: i for i, index in enumerate(network.lanes_dict())}
+    return np.array([sum(1 << number[side] for side in network.all_side_lanes(index)) for index in number], np.int64)
+
+
 def lead_of(network) -> np.ndarray:
     """How far before its start cars head for each lane `[L]` [m]."""
     indices = list(network.lanes_dict())

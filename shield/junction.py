@@ -73,6 +73,7 @@ CROSSING = np.dtype(
         ("y", "f8"),
         ("speed", "f8"),
         ("lanes", "i8"),  # lanes on which it may be now or next, as a set of bits
+        ("reachable", "i8"),  # likewise, if it changes lanes
         ("ego_broke", "i8"),  # first duty each broke since the last sample with a plan, index into `blame.DUTIES`
         ("ego_excess", "f8"),
         ("other_broke", "i8"),
@@ -89,6 +90,7 @@ SAMPLE = np.dtype(
         ("speed", "f8"),
         ("lanes", "i8"),  # lanes on which it may be, as a set of bits
         ("next_lanes", "i8"),  # these and the ones that follow
+        ("reachable", "i8"),  # those, and lanes beside them
         ("wreck", "?"),
         ("astray", "?"),  # on no lane at all
     ],
@@ -321,6 +323,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     if trapped and not kept and not cut_in:
         kept = _is_kept(scene, i, a, 0)
     memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
+    memory.reachable = sample.reachable
     memory.wreck, memory.astray = sample.wreck, sample.astray
     memory.age += 1
     memory.relied, memory.relied_before = False, memory.relied

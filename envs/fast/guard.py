@@ -238,7 +238,7 @@ def refuse_lane_change(before, cars, episode, past, sight, frames, settings):
     if ego.target_lane == before or lanes[ego.target_lane].road != lanes[before].road:
         return
     n, path = episode.cars - 1, episode.path
-    track, count = _look(cars, episode, sight, frames, settings)
+    track, count = _look(cars, episode, past, sight, frames, settings)
     scene = Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt)
     if not has_plan(scene, past.crossings[:n], settings.entry, not settings.waits_anywhere):
         ego.target_lane, episode.path = before, path
@@ -249,7 +249,7 @@ def refuse_lane_change(before, cars, episode, past, sight, frames, settings):
 def _plan(cars, episode, past, sight, frames, settings, acceleration):
     """The plan through the junction ahead."""
     n = episode.cars - 1
-    track, count = _look(cars, episode, sight, frames, settings)
+    track, count = _look(cars, episode, past, sight, frames, settings)
     scene = Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt)
     return junction_frame(
         scene,
@@ -265,7 +265,7 @@ def _plan(cars, episode, past, sight, frames, settings, acceleration):
 
 
 @compiled
-def _look(cars, episode, sight, frames, settings):
+def _look(cars, episode, past, sight, frames, settings):
     """The ego's track, and how many ways the others may take."""
     n = episode.cars - 1
     for i in range(n):
@@ -277,6 +277,7 @@ def _look(cars, episode, sight, frames, settings):
         frames.roads,
         track,
         sight.on_road[:n],
+        past.crossings[:n],
         settings.intent,
         settings.other.v_cap,
         sight.samples,
@@ -374,7 +375,7 @@ def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
     n, last = episode.cars - 1, len(past.memory) - 1
     now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
     if settings.scheme != LANES:
-        _look(cars, episode, sight, frames, settings)
+        _look(cars, episode, past, sight, frames, settings)
     heaviest, touched = -1, False
     for i in range(n):
         touched |= _touches(cars, _car_of(i, episode), episode.ego, sight, settings.dt)
