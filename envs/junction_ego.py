@@ -1,4 +1,4 @@
-"""The shield on one controlled vehicle where roads cross or merge: plans, besides distances along the lane."""
+"""The shield on one controlled vehicle where roads cross: plans in place of distances along the lane."""
 
 import numpy as np
 

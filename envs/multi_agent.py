@@ -7,8 +7,8 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
-from envs.highway import Frame, Settings, ShieldedEgo, log_of
-from envs.shielding import attach, begin_step, end_step, info_of
+from envs.highway import Frame, Settings, ShieldedEgo
+from envs.shielding import attach, audit_of, begin_step, end_step, info_of
 from envs.traffic import shield_everybody
 from envs.wrapper import (
     check_action_type,
@@ -19,7 +19,7 @@ from envs.wrapper import (
     settings_for,
     traffic_info,
 )
-from shield.blame import Audit, audit
+from shield.blame import Audit
 from shield.params import Preset, RSSParams, Rules
 
 
@@ -95,8 +95,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
 
     def audit(self) -> tuple[Audit, ...]:
         """`ShieldWrapper.audit` for each agent. Needs `record=True`."""
-        of = self.settings
-        return tuple(audit(log_of(frames), of.ego, of.other, of.rules, of.dt) for frames in self.frames)
+        return tuple(audit_of(frames, self.settings) for frames in self.frames)
 
     @property
     def settings(self) -> Settings:

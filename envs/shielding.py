@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from envs.highway import LANES, Settings, ShieldedEgo, StepTally, response_name
+from envs.highway import LANES, Frame, Settings, ShieldedEgo, StepTally, log_of, response_name
 from envs.junction_ego import JunctionEgo
+from shield.blame import Audit, audit
 
 LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
 
@@ -58,3 +59,17 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
         "episode_broken_duties": ego.broken_duties,
         "min_ttc": min(ego.min_ttc, LONGEST_TTC),
     }
+
+
+def audit_of(frames: list[Frame], settings: Settings) -> Audit:
+    """For every dangerous pair-frame of one ego: did it keep its duty?
+
+    Raises:
+      ValueError: roads cross; recorded frames hold distances along a lane, and the duties there are others.
+    """
+    if settings.scheme != LANES:
+        raise ValueError(
+            "audit: expected an environment without junctions; where roads cross, infos count the pair-frames: "
+            "episode_dangerous_pairs, episode_broken_duties"
+        )
+    return audit(log_of(frames), settings.ego, settings.other, settings.rules, settings.dt)

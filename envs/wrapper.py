@@ -14,10 +14,10 @@ from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
 from highway_env.envs.u_turn_env import UTurnEnv
 
-from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo, log_of
-from envs.shielding import attach, begin_step, end_step, info_of
+from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
+from envs.shielding import attach, audit_of, begin_step, end_step, info_of
 from envs.traffic import TRAFFIC, shield_everybody
-from shield.blame import Audit, audit
+from shield.blame import Audit
 from shield.examined import EXAMINED
 from shield.junction import ENTRIES
 from shield.kinematics import frames_for
@@ -141,9 +141,12 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         return self._ego.record
 
     def audit(self) -> Audit:
-        """For every dangerous pair-frame of this episode so far: did the ego keep its duty? Needs `record=True`."""
-        settings = self.settings
-        return audit(log_of(self.frames), settings.ego, settings.other, settings.rules, settings.dt)
+        """For every dangerous pair-frame of this episode so far: did the ego keep its duty? Needs `record=True`.
+
+        Raises:
+          ValueError: nothing was recorded, or roads cross: infos count the duties there.
+        """
+        return audit_of(self.frames, self.settings)
 
     @property
     def settings(self) -> Settings:

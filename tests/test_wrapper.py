@@ -240,3 +240,10 @@ def test_the_audit_of_a_recorded_episode_agrees_with_the_judge_on_the_spot():
         assert audit.dangerous.sum() == pairs > 0
         assert (audit.duty > 0).sum() == broken
         assert broken == 0 if mode == "override" else broken > 0
+
+
+def test_the_audit_of_distances_is_refused_where_roads_cross():
+    env = make("intersection-v0", record=True)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="expected an environment without junctions"):
+        env.audit()
