@@ -47,13 +47,14 @@ class Settings(NamedTuple):
 class Frame(NamedTuple):
     """One recorded frame: everything the shield saw, and the command that was executed."""
 
-    ego: np.ndarray  # `ROAD_USER`, 0-d
-    users: np.ndarray  # `[N]` `ROAD_USER`
     keys: tuple[int, ...]  # `[N]` identity of each user within the episode
-    command: Command
-    curvature: float  # of the lane at the ego [1/m]
-    jumped: bool  # the lane frame moved everybody at once on this frame
     poses: np.ndarray  # `[N + 1, 4]` x, y, heading, speed in the world, the ego last
+    command: Command
+    # in the lane frame of the ego, which nothing is measured in where roads cross
+    ego: np.ndarray | None = None  # `ROAD_USER`, 0-d
+    users: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` `ROAD_USER`
+    curvature: float = 0.0  # of the lane at the ego [1/m]
+    jumped: bool = False  # the lane frame moved everybody at once on this frame
 
 
 def log_of(frames: list[Frame]) -> Log:
@@ -173,6 +174,7 @@ class ShieldedEgo:
         self.keys: list[int] = []
         self.seen = 0
         self.memory = np.zeros(0, MEMORY)
+        self.poses = np.zeros((0, 4))
         self.before = np.zeros((0, 2))
         self.boxes = np.zeros((0, 4))
         self.last = (np.zeros(1, ROAD_USER)[0], np.zeros(0, ROAD_USER))  # ego and others on the frame before
@@ -204,15 +206,15 @@ class ShieldedEgo:
         # meta-actions compute a new command on every frame, a continuous one persists
         nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
         steering = float(nominal["steering"])  # single precision where the agent's action is
+        self._meet()
         users, ego, curvature = self._sense()
         wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
-        granted = self._grant(wish)
         report = shield_frame(
             ego,
             users,
             *self.last,
             self.memory,
-            granted,
+            wish,
             Body(*self.body, curvature),
             settings.ego,
             settings.other,
@@ -232,12 +234,12 @@ class ShieldedEgo:
             vehicle.action = dict(nominal)
         self.last = (ego, users)
         self._count(report, pairs, broken, command.acceleration - wish.acceleration, steered - steering)
+        tally = self.tally
+        if max(report.margin_lon, report.margin_lat) < max(tally.margin_lon, tally.margin_lat):
+            tally.margin_lon, tally.margin_lat = report.margin_lon, report.margin_lat
+            tally.partner = self._index_on_road(report.partner)
         if self.record is not None:
-            self.record.append(Frame(ego, users, tuple(self.keys), command, curvature, self.jumped, self.poses))
-
-    def _grant(self, wish: Command) -> Command:
-        """What is left of a command before the lanes have their say."""
-        return wish
+            self.record.append(Frame(tuple(self.keys), self.poses, command, ego, users, curvature, self.jumped))
 
     def _count(self, report, pairs: int, broken: int, acceleration_change: float, steering_change: float) -> None:
         tally, overrides = self.tally, self.settings.overrides
@@ -248,9 +250,6 @@ class ShieldedEgo:
         tally.broken_duties += broken
         tally.acceleration_change = max(tally.acceleration_change, abs(acceleration_change))
         tally.steering_change = max(tally.steering_change, abs(float(steering_change)))
-        if max(report.margin_lon, report.margin_lat) < max(tally.margin_lon, tally.margin_lat):
-            tally.margin_lon, tally.margin_lat = report.margin_lon, report.margin_lat
-            tally.partner = self._index_on_road(report.partner)
         tally.response |= report.response
         self.frames += 1
         self.frames_overridden += report.overridden and overrides
@@ -268,30 +267,24 @@ class ShieldedEgo:
 
     def _sense(self):
         """Everybody else `[N]` and the ego as `ROAD_USER` records in the lane frame of the ego."""
-        vehicle, settings = self.vehicle, self.settings
-        self._meet()
         self._choose_frame()
-
         others = self.others
-        everybody = [*others, vehicle]
-        poses = np.array([(*v.position, v.heading, v.speed) for v in everybody], dtype=float)
-        out = np.zeros(len(everybody), ROAD_USER)
+        out = np.zeros(len(others) + 1, ROAD_USER)
         out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in others]
-        out["in_own_lane"] = [self._in_own_lane(v) for v in everybody]
-        out["elsewhere"][:-1] = [self._is_elsewhere(v) for v in others]
-        curvature = to_lane_frame_all(self.road, poses, self.before, self.boxes, settings.dt, out)
-        self.before = poses[:, :2]
-        self.poses = poses
+        out["in_own_lane"] = [self._in_own_lane(v) for v in [*others, self.vehicle]]
+        curvature = to_lane_frame_all(self.road, self.poses, self.before, self.boxes, self.settings.dt, out)
+        self.before = self.poses[:, :2]
         return out[:-1], out[-1], curvature
 
     def _meet(self) -> None:
-        """Find out who is on the road."""
+        """Find out who is on the road, and where."""
         vehicle = self.vehicle
         road = vehicle.road
         others = [v for v in road.vehicles if v is not vehicle]
         others += [o for o in road.objects if not isinstance(o, Landmark) and o.collidable]
         if others != self.others or len(self.before) != len(others) + 1:
             self._follow(others)
+        self.poses = np.array([(*v.position, v.heading, v.speed) for v in [*others, vehicle]], dtype=float)
 
     def _follow(self, others: list) -> None:
         """Carry the memory over to a new set of road users, by identity."""
@@ -329,10 +322,6 @@ class ShieldedEgo:
                 forget_safe(memory)
         self.lane_index, self.road = index, road
 
-    def _is_elsewhere(self, other) -> bool:
-        """Does a road user drive on a road that the ego's lane does not belong to?"""
-        return False
-
     def _in_own_lane(self, other) -> bool:
         """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
         if other.lane is None or np.cos(other.heading - self.vehicle.heading) > 0.0:
@@ -354,15 +343,11 @@ class ShieldedEgo:
         return self.contact is not None
 
     def _judge_contact(self) -> dict:
-        users, ego, _ = self._sense()
+        self._meet()
         touching = [i for i, other in enumerate(self.others) if self._touches(other)]
         if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
-        settings = self.settings
-        rules = (settings.ego, settings.other, settings.rules, settings.dt)
-        for i in touching:
-            catch_up(self.memory[i], self.last[0], self.last[1][i], *rules)
-        verdicts = [self._verdict(i, ego, users[i]) for i in touching]
+        verdicts = self._verdicts(touching)
         # several at once: the one that weighs most against the ego counts
         weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
         i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: weight[VERDICTS[pair[1].verdict]])
@@ -370,16 +355,20 @@ class ShieldedEgo:
             "verdict": VERDICTS[verdict.verdict],
             "partner": self._index_on_road(i),
             "danger": self._danger(i, int(verdict.axes)),
-            "seconds_since_threshold": verdict.frames * settings.dt,
+            "seconds_since_threshold": verdict.frames * self.settings.dt,
             "ego_duty": DUTIES[verdict.ego_duty],
             "ego_excess": float(verdict.ego_excess),
             "other_duty": DUTIES[verdict.other_duty],
             "other_excess": float(verdict.other_excess),
         }
 
-    def _verdict(self, i: int, ego, user) -> Verdict:
-        settings = self.settings
-        return judge_contact(ego, user, self.memory[i], settings.ego, settings.other, settings.rules, settings.dt)
+    def _verdicts(self, touching: list[int]) -> list[Verdict]:
+        settings, memory = self.settings, self.memory
+        rules = settings.ego, settings.other, settings.rules, settings.dt
+        users, ego, _ = self._sense()
+        for i in touching:
+            catch_up(memory[i], self.last[0], self.last[1][i], *rules)
+        return [judge_contact(ego, users[i], memory[i], *rules) for i in touching]
 
     def _danger(self, i: int, kind: int) -> str:
         return AXES[kind]

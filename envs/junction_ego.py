@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from envs.highway import Settings, ShieldedEgo
+from envs.highway import Frame, Settings, ShieldedEgo
 from envs.intent import CAR_ON_ROAD, Junction, list_threats, track_of
 from envs.signalised import SignalisedRoad
 from shield.blame import Verdict
@@ -17,7 +17,6 @@ from shield.junction import (
     has_plan,
     judge_crossing,
     junction_frame,
-    no_report,
 )
 from shield.kinematics import stopping_distance
 from shield.plans import GO, STOP, THREAT, Scene
@@ -51,31 +50,41 @@ class JunctionEgo(ShieldedEgo):
         self.box = np.zeros(6)
         self.path = -1
         self.refused = False  # the lane change of this decision
-        self.report: JunctionReport = no_report(0.0)
         self.frames_trapped = 0
         self.pairs_examined = self.pairs_possible = 0  # pair-frames: plans were checked against somebody, could be
         self.may_pass: bool | None = None  # the light ahead
 
-    def _grant(self, wish: Command) -> Command:
-        settings = self.settings
+    def _frame(self) -> None:
+        vehicle, settings = self.vehicle, self.settings
+        self._meet()
+        wish = {name: float(value) for name, value in vehicle.action.items()}
         track, threats, roads = self._look()
-        if isinstance(self.vehicle.road, SignalisedRoad):
-            threats = self._heed_lights(self.vehicle.road, track, threats, roads)
-        self.report = junction_frame(
+        if isinstance(vehicle.road, SignalisedRoad):
+            threats = self._heed_lights(vehicle.road, track, threats, roads)
+        report: JunctionReport = junction_frame(
             Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt),
             self.samples,
             self.crossings,
             self.plan,
-            wish.acceleration,
+            wish["acceleration"],
             settings.entry,
             not settings.waits_anywhere,
             settings.examine,
             settings.overrides,
         )
-        self.frames_trapped += self.report.trapped
-        self.pairs_examined += self.report.examined
-        self.pairs_possible += self.report.possible
-        return wish._replace(acceleration=self.report.acceleration) if settings.overrides else wish
+        granted = report.acceleration if settings.overrides else wish["acceleration"]
+        if granted != wish["acceleration"]:
+            vehicle.action = wish | {"acceleration": granted}
+        if self.refused:
+            report = report._replace(overridden=True, limited=False)
+            self.refused = False
+        self.frames_trapped += report.trapped
+        self.pairs_examined += report.examined
+        self.pairs_possible += report.possible
+        self._count(report, report.pairs, report.broken, granted - wish["acceleration"], 0.0)
+        if self.record is not None:
+            command = Command(granted, float(np.arctan(0.5 * np.tan(wish["steering"]))))
+            self.record.append(Frame(tuple(self.keys), self.poses, command))
 
     def act(self, action=None) -> None:
         before = getattr(self.vehicle, "target_lane_index", None)
@@ -99,17 +108,6 @@ class JunctionEgo(ShieldedEgo):
         if not has_plan(scene, self.crossings, settings.entry, not settings.waits_anywhere):
             vehicle.target_lane_index, self.path = before, path
             self.refused = True
-
-    def _count(self, report, pairs: int, broken: int, acceleration_change: float, steering_change: float) -> None:
-        plans, refused = self.report, self.refused
-        self.refused = False
-        report = report._replace(
-            overridden=plans.overridden or refused,
-            limited=plans.limited and not refused,
-            response=plans.response,
-            ttc=plans.ttc,
-        )
-        super()._count(report, pairs + plans.pairs, broken + plans.broken, acceleration_change, steering_change)
 
     def _look(self):
         """The ego's track, the ways of all others, and the roads."""
@@ -187,12 +185,10 @@ class JunctionEgo(ShieldedEgo):
         self.crossings = crossings
         super()._follow(others)
 
-    def _is_elsewhere(self, other) -> bool:
-        return True
-
-    def _verdict(self, i: int, ego, user) -> Verdict:
+    def _verdicts(self, touching: list[int]) -> list[Verdict]:
         self._look()
-        return judge_crossing(self.samples[i], self.crossings[i], self.settings.other, self.settings.dt)
+        other, dt = self.settings.other, self.settings.dt
+        return [judge_crossing(self.samples[i], self.crossings[i], other, dt) for i in touching]
 
     def _danger(self, i: int, kind: int) -> str:
         return PLAN_NAMES[kind]

@@ -28,7 +28,6 @@ from shield.response import (
     LON,
     MEMORY,
     NEVER,
-    forget,
     forget_safe,
     lateral_speed_limit,
     longitudinal_response,
@@ -219,7 +218,7 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
     drift = 0.5 * curvature * ego.speed**2 * dt
     pairs = broken = 0
     for i in range(len(users)):
-        if memory[i].since > 0 and not users[i].elsewhere:
+        if memory[i].since > 0:
             judge_motion(memory[i], ego, users[i], ego_params, other_params, _NOW, 0.0, dt)
             duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
             _blame_ego(memory[i], duty, excess)
@@ -323,9 +322,6 @@ def audit(log, ego_params, other_params, rules, dt):
         drift = 0.5 * log.curvature[t] * ego.speed**2 * dt
         for i in range(count):
             if not log.present[t, i]:
-                continue
-            if log.users[t, i].elsewhere:
-                forget(memory[i])
                 continue
             if log.jumped[t]:
                 forget_safe(memory[i])

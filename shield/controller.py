@@ -8,7 +8,7 @@ from shield.command import Command
 from shield.compiled import compiled, merged
 from shield.geometry import signed_gap
 from shield.pair import assess, leading_speed, least_margin, own_share, toward
-from shield.response import Bounds, catch_up, forget, merge, owes_braking, owes_lateral_stop, remember
+from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, remember
 
 
 class Report(NamedTuple):
@@ -71,9 +71,6 @@ def shield_frame(ego, users, ego_before, users_before, memory, nominal, body, eg
     dangerous, response = False, 0
     share_ego = own_share(ego, ego_params, dt)
     for i in range(len(users)):
-        if users[i].elsewhere:
-            forget(memory[i])
-            continue
         margin = least_margin(ego, users[i], share_ego, ego_params, other_params, rules, dt)
         if memory[i].since == 0 and margin > max(worst, _FAR) and not _may_be_next(ego, users[i], ttc, rules):
             memory[i].skipped = True

@@ -117,12 +117,6 @@ class JunctionReport(NamedTuple):
 
 
 @compiled
-def no_report(nominal):
-    """`JunctionReport` where there is no junction."""
-    return JunctionReport(nominal, False, False, 0, 0, 0, False, np.inf, 0, 0)
-
-
-@compiled
 def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides):
     """Restrict the ego's acceleration to what leaves it a plan, and judge everybody.
 

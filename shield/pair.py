@@ -25,7 +25,6 @@ ROAD_USER = np.dtype(
         ("half_width", "f8"),
         ("in_own_lane", "?"),  # drives in a lane meant for its direction
         ("wreck", "?"),  # has crashed, or never moves: it may stop on the spot
-        ("elsewhere", "?"),  # drives on another road: distances along the ego's lane say nothing about it
     ],
     align=True,
 )

@@ -117,13 +117,6 @@ def forget_safe(memory):
 
 
 @compiled
-def forget(memory):
-    """Drop a memory, in place: the pair has nothing to do with each other's lanes any more."""
-    memory.age = memory.since = 0
-    memory.axes, memory.skipped = NEVER, False
-
-
-@compiled
 def owes(memory, axis):
     """Does this pair owe a response on `axis` now? Danger from the start is answered on both."""
     return memory.since > 0 and (memory.axes == NEVER or (memory.axes & axis) != 0)

@@ -107,7 +107,7 @@ def test_each_agent_is_a_road_user_to_the_other():
     env.step((FASTER, FASTER))
     for frames, ego, other in zip(env.frames, start, reversed(start), strict=True):
         assert len(frames) == 15
-        assert len(frames[0].users) == others
+        assert len(frames[0].keys) == others
         poses = [tuple(pose[:2]) for pose in frames[0].poses]
         assert poses[-1] == ego
         assert other in poses[:-1]

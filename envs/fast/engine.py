@@ -40,7 +40,7 @@ from envs.fast.scenes import make_scene
 from envs.fast.sight import make_sight, sort_along_x
 from envs.fast.state import CAR, EPISODE, STEP
 from envs.fast.traffic_flow import let_traffic_flow, open_intersection
-from envs.highway import Settings
+from envs.highway import LANES, PLANS, Settings
 from shield.junction import CROSSING
 from shield.pair import ROAD_USER
 from shield.params import PRESETS, Rules
@@ -73,9 +73,10 @@ class Batch(NamedTuple):
     cars: np.ndarray  # `[E, N]` CAR
     episodes: np.ndarray  # `[E]` EPISODE
     order: np.ndarray  # `[E, N]` indices sorted by x
-    memory: np.ndarray  # `[E, N]` MEMORY of the shield, `[E, 0]` without one
-    crossings: np.ndarray  # `[E, N]` see `guard.Past`
-    before: np.ndarray  # `[E, N, 2]` see `guard.Past`
+    # past of the shield, see `guard.Past`; where it needs none, or where there is no shield, N = 0
+    crossings: np.ndarray  # `[E, N]`
+    memory: np.ndarray  # `[E, N]`
+    before: np.ndarray  # `[E, N, 2]`
     seen: np.ndarray  # `[E, 2, N]`
 
 
@@ -203,7 +204,7 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
     config, lanes = world.config[0], world.network.lanes
     for e in range(first, last):
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
-        past = Past(batch.memory[e], batch.crossings[e], batch.before[e], batch.seen[e])
+        past = Past(batch.crossings[e], batch.memory[e], batch.before[e], batch.seen[e])
         observation = outputs.observations[e]
         outputs.rewards[e] = 0.0
         outputs.terminated[e] = outputs.truncated[e] = False
@@ -266,7 +267,8 @@ class Engine:
         self.mode = OFF if settings is None else OVERRIDE if settings.overrides else MONITOR
         self.penalty = float(penalty)
         self.settings = settings or Settings(*PRESETS["simulator"][:2], Rules(), False, 1.0)
-        watched = n if settings else 0
+        crossing = n if settings and settings.scheme == PLANS else 0
+        watched = n if settings and settings.scheme == LANES else 0
         self.world = World(
             scenario.config,
             scenario.network,
@@ -282,8 +284,8 @@ class Engine:
             np.zeros((num_envs, n), CAR),
             np.zeros(num_envs, EPISODE),
             np.zeros((num_envs, n), np.int64),
+            np.zeros((num_envs, crossing), CROSSING),
             np.zeros((num_envs, watched), MEMORY),
-            np.zeros((num_envs, watched), CROSSING),
             np.zeros((num_envs, watched, 2)),
             np.zeros((num_envs, 2, watched), ROAD_USER),
         )

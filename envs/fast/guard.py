@@ -9,18 +9,18 @@ from typing import NamedTuple
 import numpy as np
 
 from envs.fast.collisions import is_near, overlap
-from envs.fast.compiled import compiled, unfolded
+from envs.fast.compiled import compiled, merged, unfolded
 from envs.fast.floats import norm
 from envs.fast.network import Network, heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
-from envs.highway import LANES, PLANS, road_through
+from envs.highway import PLANS, road_through
 from envs.intent import Junction, Roads, list_threats, no_roads, track_of
 from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
 from shield.command import Command
 from shield.controller import Body, shield_frame
 from shield.geometry import PIECE_FIELDS, largest_half_extents
-from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame, no_report
+from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame
 from shield.lane_frame import same_frame, to_lane_frame
 from shield.plans import Scene
 from shield.response import MEMORY, catch_up, forget_safe
@@ -30,20 +30,25 @@ _PLANS = 4  # kinds of danger from here on are plans, in `infos`
 
 
 class Frames(NamedTuple):
-    """Lane frames in which the shield measures. L lanes."""
+    """What the shield measures by. L lanes."""
 
+    # where lanes keep the ego safe
     pieces: np.ndarray  # `[P, 8]` pieces of the roads through all lanes
     start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
     same: np.ndarray  # `[L, L]` no gap jumps between the two frames
+    # where plans do
     roads: Roads  # paths through junctions
     choice: np.ndarray  # `[R + 1, L]` row of the paths of a driver with route R who heads for lane L; last: no route
 
 
 class Past(NamedTuple):
-    """What the shield remembers of one environment with room for N road users, the ego in the last row."""
+    """What the shield remembers of one environment with room for N road users, the ego in the last row.
 
-    memory: np.ndarray  # `[N]` MEMORY
+    Where lanes keep the ego safe there are no `crossings`, and where plans do there is nothing else.
+    """
+
     crossings: np.ndarray  # `[N]` CROSSING
+    memory: np.ndarray  # `[N]` MEMORY
     before: np.ndarray  # `[N, 2]` positions one frame ago, nan at first sight [m]
     seen: np.ndarray  # `[2, N]` ROAD_USER of the last two frames; `episode.turn` is the row of the last one
 
@@ -63,19 +68,14 @@ def compile_frames(network, net: Network, scheme: int) -> Frames:
       network: the road network, net: the same as arrays.
       scheme: what keeps the ego safe, as in `Settings`.
     """
-    indices = list(network.lanes_dict())
-    lanes = [road_through(network, index) for index in indices]
-    roads, choice = no_roads(), np.zeros((1, 0), np.int64)
-    if scheme != LANES:
+    if scheme == PLANS:
         junction = junction_of(network)
-        choice = _choices(junction, network, net)
-        roads = junction.roads
-    return Frames(
-        np.concatenate(lanes),
-        np.cumsum([0, *map(len, lanes)]),
-        np.array([[same_frame(a, b) for b in lanes] for a in lanes]),
-        roads,
-        choice,
+        return no_frames()._replace(roads=junction.roads, choice=_choices(junction, network, net))
+    lanes = [road_through(network, index) for index in network.lanes_dict()]
+    return no_frames()._replace(
+        pieces=np.concatenate(lanes),
+        start=np.cumsum([0, *map(len, lanes)]),
+        same=np.array([[same_frame(a, b) for b in lanes] for a in lanes]),
     )
 
 
@@ -103,9 +103,10 @@ def make_watch(heading_bound):
 @compiled
 def start_watch(episode, past, watch):
     """Forget everything at the start of an episode."""
+    for i in range(len(past.crossings)):
+        past.crossings[i] = watch.blank_crossing[0]
     for i in range(len(past.memory)):
         past.memory[i] = watch.blank[0]
-        past.crossings[i] = watch.blank_crossing[0]
         past.before[i, 0] = past.before[i, 1] = np.nan
     episode.frame_lane, episode.turn, episode.go, episode.frames_trapped = -1, 0, -1, 0
     episode.path = -1
@@ -122,23 +123,16 @@ def start_watch(episode, past, watch):
 
 @compiled
 def carry_over(episode, cars, past, ego, watch):
-    """Cars came and went: everybody's past moves along.
+    """Cars came and went, as they do at intersections: everybody's past moves along.
 
     Args:
       ego: index of the ego before.
     """
-    for i in range(len(past.memory) - 1):
+    for i in range(len(past.crossings) - 1):
         k = _car_of(i, episode)
         was = cars[k].was if k < episode.cars else -1
-        if was < 0:
-            past.memory[i] = watch.blank[0]
-            past.crossings[i] = watch.blank_crossing[0]
-            past.before[i, 0] = past.before[i, 1] = np.nan
-            continue
-        j = was if was < ego else was - 1  # never less than i: those after a gap move up
-        past.memory[i], past.crossings[i] = past.memory[j], past.crossings[j]
-        past.before[i, 0], past.before[i, 1] = past.before[j, 0], past.before[j, 1]
-        past.seen[0, i], past.seen[1, i] = past.seen[0, j], past.seen[1, j]
+        # those after a gap move up
+        past.crossings[i] = watch.blank_crossing[0] if was < 0 else past.crossings[was if was < ego else was - 1]
 
 
 @compiled
@@ -167,6 +161,15 @@ def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step
     """
     if check_contact(cars, episode, past, lanes, sight, frames, watch, settings):
         return
+    if settings.scheme == PLANS:
+        _keep_plan(cars, episode, past, sight, frames, settings, step)
+    else:
+        _keep_distances(cars, episode, past, lanes, sight, frames, watch, settings, step)
+
+
+@compiled
+def _keep_distances(cars, episode, past, lanes, sight, frames, watch, settings, step):
+    """Defs. 1-10, along the lane of the ego."""
     car = cars[episode.ego]
     if car.kind == DIRECT:
         acceleration, steering = episode.nominal_acceleration, episode.nominal_steering
@@ -177,10 +180,6 @@ def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step
     now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
     ego, users, memory = now[last], now[:n], past.memory[:n]
     wish = Command(acceleration, np.arctan(0.5 * np.tan(steering)))
-    granted, plans = wish, no_report(wish.acceleration)
-    if settings.scheme != LANES:
-        plans = _plan(cars, episode, past, sight, frames, settings, acceleration)
-        granted = Command(plans.acceleration if settings.overrides else wish.acceleration, wish.slip)
     max_slip = np.arctan(np.tan(np.pi / 3) / 2)
     report = shield_frame(
         ego,
@@ -188,7 +187,7 @@ def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step
         then[last],
         then[:n],
         memory,
-        granted,
+        wish,
         Body(car.length / 2, max_slip, curvature),
         settings.ego,
         settings.other,
@@ -202,29 +201,55 @@ def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step
         steered = np.arctan(2.0 * np.tan(command.slip))
     if settings.overrides:
         car.acceleration, car.steering = command.acceleration, steered
-
-    pairs, broken = pairs + plans.pairs, broken + plans.broken
-    overridden = (report.overridden or plans.overridden or episode.refused) and settings.overrides
-    episode.refused = False
-    step.frames += 1
-    step.overridden += overridden
-    step.limited += (report.limited or plans.limited) and not overridden and settings.overrides
-    step.dangerous_pairs += pairs
-    step.broken_duties += broken
+    _count(episode, step, report, pairs, broken, settings.overrides)
     step.acceleration_change = max(step.acceleration_change, abs(command.acceleration - acceleration))
     step.steering_change = max(step.steering_change, abs(steered - steering))
     if max(report.margin_lon, report.margin_lat) < max(step.margin_lon, step.margin_lat):
         step.margin_lon, step.margin_lat = report.margin_lon, report.margin_lat
         step.partner = _car_of(report.partner, episode)
-    step.response |= report.response | plans.response
+
+
+@compiled
+def _keep_plan(cars, episode, past, sight, frames, settings, step):
+    """Defs. 14-18: a plan through the junction ahead."""
+    car, n = cars[episode.ego], episode.cars - 1
+    scene = _scene(cars, episode, past, sight, frames, settings)
+    plans = junction_frame(
+        scene,
+        sight.samples[:n],
+        past.crossings[:n],
+        episode,
+        car.acceleration,
+        settings.entry,
+        not settings.waits_anywhere,
+        settings.examine,
+        settings.overrides,
+    )
+    if settings.overrides:
+        step.acceleration_change = max(step.acceleration_change, abs(plans.acceleration - car.acceleration))
+        car.acceleration = plans.acceleration
+    _count(episode, step, plans, plans.pairs, plans.broken, settings.overrides)
+    episode.frames_trapped += plans.trapped
+    episode.pairs_examined += plans.examined
+    episode.pairs_possible += plans.possible
+
+
+@merged
+def _count(episode, step, report, pairs, broken, overrides):
+    """Take what happened on one frame into the tally."""
+    overridden = (report.overridden or episode.refused) and overrides
+    episode.refused = False
+    step.frames += 1
+    step.overridden += overridden
+    step.limited += report.limited and not overridden and overrides
+    step.dangerous_pairs += pairs
+    step.broken_duties += broken
+    step.response |= report.response
     episode.dangerous_pairs += pairs
     episode.broken_duties += broken
     episode.frames += 1
     episode.frames_overridden += overridden
-    episode.frames_trapped += plans.trapped
-    episode.pairs_examined += plans.examined
-    episode.pairs_possible += plans.possible
-    episode.min_ttc = min(episode.min_ttc, report.ttc, plans.ttc)
+    episode.min_ttc = min(episode.min_ttc, report.ttc)
 
 
 @compiled
@@ -238,35 +263,15 @@ def refuse_lane_change(before, cars, episode, past, sight, frames, settings):
     if ego.target_lane == before or lanes[ego.target_lane].road != lanes[before].road:
         return
     n, path = episode.cars - 1, episode.path
-    track, count = _look(cars, episode, past, sight, frames, settings)
-    scene = Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt)
+    scene = _scene(cars, episode, past, sight, frames, settings)
     if not has_plan(scene, past.crossings[:n], settings.entry, not settings.waits_anywhere):
         ego.target_lane, episode.path = before, path
         episode.refused = True
 
 
 @compiled
-def _plan(cars, episode, past, sight, frames, settings, acceleration):
-    """The plan through the junction ahead."""
-    n = episode.cars - 1
-    track, count = _look(cars, episode, past, sight, frames, settings)
-    scene = Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt)
-    return junction_frame(
-        scene,
-        sight.samples[:n],
-        past.crossings[:n],
-        episode,
-        acceleration,
-        settings.entry,
-        not settings.waits_anywhere,
-        settings.examine,
-        settings.overrides,
-    )
-
-
-@compiled
-def _look(cars, episode, past, sight, frames, settings):
-    """The ego's track, and how many ways the others may take."""
+def _scene(cars, episode, past, sight, frames, settings):
+    """The ego's track and the ways that the others may take."""
     n = episode.cars - 1
     for i in range(n):
         _describe(cars[_car_of(i, episode)], frames, sight.on_road[i])
@@ -286,7 +291,8 @@ def _look(cars, episode, past, sight, frames, settings):
     )
     if count > len(sight.threats):
         episode.overflow = True
-    return track, min(count, len(sight.threats))
+    count = min(count, len(sight.threats))
+    return Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt)
 
 
 @compiled
@@ -344,7 +350,6 @@ def _sense(cars, episode, past, lanes, sight, frames, watch, settings):
             user,
         )
         user.wreck = not is_ego and (car.crashed or car.kind == OBSTACLE)
-        user.elsewhere = settings.scheme == PLANS and not is_ego
         user.in_own_lane = _in_own_lane(k, car, ego, lanes, sight)
         before[i, 0], before[i, 1] = car.x, car.y
     return curvature  # of the lane at the ego, the last one
@@ -371,11 +376,13 @@ def check_contact(cars, episode, past, lanes, sight, frames, watch, settings):
 
 @compiled
 def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
-    _sense(cars, episode, past, lanes, sight, frames, watch, settings)
+    plans = settings.scheme == PLANS
+    if plans:
+        _scene(cars, episode, past, sight, frames, settings)
+    else:
+        _sense(cars, episode, past, lanes, sight, frames, watch, settings)
     n, last = episode.cars - 1, len(past.memory) - 1
     now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
-    if settings.scheme != LANES:
-        _look(cars, episode, past, sight, frames, settings)
     heaviest, touched = -1, False
     for i in range(n):
         touched |= _touches(cars, _car_of(i, episode), episode.ego, sight, settings.dt)
@@ -384,7 +391,7 @@ def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
         k = _car_of(i, episode)
         if not (_touches(cars, k, episode.ego, sight, settings.dt) if touched else k == nearest):
             continue
-        if now[i].elsewhere:
+        if plans:
             verdict = judge_crossing(sight.samples[i], past.crossings[i], settings.other, settings.dt)
         else:
             memory = past.memory[i]
@@ -396,7 +403,7 @@ def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
         if weight > heaviest:
             heaviest = weight
             episode.blame, episode.blame_partner = 1 + verdict.verdict, k
-            episode.blame_axes, episode.blame_frames = verdict.axes + _PLANS * now[i].elsewhere, verdict.frames
+            episode.blame_axes, episode.blame_frames = verdict.axes + _PLANS * plans, verdict.frames
             episode.ego_duty, episode.ego_excess = verdict.ego_duty, verdict.ego_excess
             episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
 
