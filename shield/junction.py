@@ -37,6 +37,7 @@ from shield.plans import (
     GO,
     NEVER,
     STOP,
+    Scene,
     begin,
     behind_by,
     can_give_way,
@@ -287,6 +288,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
       judged more strictly: whoever left itself no plan toward the other is to blame, trapped or not.
     """
     _judge_motion(sample, memory, scene.other, scene.dt)
+    scene = _alone_with(scene, i)
     follows, gap_is_safe = _is_behind(scene, i, memory.behind)
     dangerous, kept, items, cut_in = False, True, STOP, False
     if follows:
@@ -322,6 +324,16 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     memory.age += 1
     memory.relied, memory.relied_before = False, memory.relied
     return dangerous, kept
+
+
+@merged
+def _alone_with(scene, i):
+    """The scene without the ways of others before and after those of a road user, which stand together."""
+    first, last = len(scene.threats), 0
+    for k in range(len(scene.threats)):
+        if scene.threats[k].user == i:
+            first, last = min(first, k), k + 1
+    return Scene(scene.paths, scene.track, scene.threats[first:last], scene.ego, scene.other, scene.dt)
 
 
 @merged
