@@ -67,9 +67,7 @@ def against_original(env_id: str, config: Config) -> None:
     """One environment: highway-env, the engine at several sizes, and the engine with the shield."""
     original = Candidate(envs.make_vec(env_id, 1, shield=None, backend="highway-env"))
     engine = {n: Candidate(envs.make_vec(env_id, n, shield=None)) for n in SIZES}
-    shielded = {}
-    if not env_id.startswith(("intersection", "roundabout")):
-        shielded = {mode: Candidate(envs.make_vec(env_id, 1024, shield=mode)) for mode in ("monitor", "override")}
+    shielded = {mode: Candidate(envs.make_vec(env_id, 1024, shield=mode)) for mode in ("monitor", "override")}
     for _ in range(config.rounds):
         original.take_turn(4 * config.seconds)
         for candidate in (*engine.values(), *shielded.values()):
