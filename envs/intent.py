@@ -83,9 +83,14 @@ def no_roads() -> Roads:
 
 
 class Junction:
-    """Paths of a road network, by the names that highway-env gives to lanes and nodes."""
+    """Paths of a road network, by the names that highway-env gives to lanes and nodes.
 
-    def __init__(self, network) -> None:
+    Args:
+      network: the road network.
+      room: the ego may be this much further to either side than highway-env's drivers [m].
+    """
+
+    def __init__(self, network, room: float = 0.0) -> None:
         self.number = {index: i for i, index in enumerate(network.lanes_dict())}
         self.walks = walks(network)
         self._rows: list[list[int]] = []
@@ -96,7 +101,10 @@ class Junction:
         lanes = compile_network(network, False).lanes
         self.lead, self.following, self.beside = lead_of(network), successors_of(network), beside(network)
         self.limit = float(lanes["speed_limit"].max())
-        self._arrays = (compile_paths(network, self.limit), lanes, np.array(through), np.array(straight))
+        self._arrays = (compile_paths(network, self.limit, room), lanes, np.array(through), np.array(straight))
+
+    def __deepcopy__(self, memo) -> "Junction":
+        return self  # what is added later are answers to questions
 
     @property
     def roads(self) -> Roads:

@@ -1,6 +1,7 @@
 """The shield on one controlled vehicle where roads cross: plans in place of distances along the lane."""
 
 import numpy as np
+from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.highway import Frame, Settings, ShieldedEgo
 from envs.intent import CAR_ON_ROAD, Junction, list_threats, track_of
@@ -26,13 +27,18 @@ PLAN_NAMES = {0: "inherited", STOP: "stop", GO: "go", STOP | GO: "both"}
 _junctions: dict[tuple, Junction] = {}
 
 
-def junction_of(network) -> Junction:
-    """Paths of a road network; the same roads are never measured twice in a process."""
+def junction_of(network, room: float = 0.0) -> Junction:
+    """Paths of a road network; the same roads are never measured twice in a process.
+
+    Args:
+      network: the road network.
+      room: the ego may be this much further to either side than highway-env's drivers [m].
+    """
     lanes = [network.get_lane(index) for index in network.lanes_dict()]
     ends = [tuple(lane.position(s, 0.0).round(3)) for lane in lanes for s in (0.0, lane.length)]
-    key = (*network.lanes_dict(), *ends, *((lane.priority, lane.speed_limit) for lane in lanes))
+    key = (room, *network.lanes_dict(), *ends, *((lane.priority, lane.speed_limit) for lane in lanes))
     if key not in _junctions:
-        _junctions[key] = Junction(network)
+        _junctions[key] = Junction(network, room)
     return _junctions[key]
 
 
@@ -57,34 +63,56 @@ class JunctionEgo(ShieldedEgo):
     def _frame(self) -> None:
         vehicle, settings = self.vehicle, self.settings
         self._meet()
-        wish = {name: float(value) for name, value in vehicle.action.items()}
-        track, threats, roads = self._look()
-        if isinstance(vehicle.road, SignalisedRoad):
-            threats = self._heed_lights(vehicle.road, track, threats, roads)
-        report: JunctionReport = junction_frame(
-            Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt),
-            self.samples,
-            self.crossings,
-            self.plan,
-            wish["acceleration"],
-            settings.entry,
-            not settings.waits_anywhere,
-            settings.examine,
-            settings.overrides,
-        )
-        granted = report.acceleration if settings.overrides else wish["acceleration"]
-        if granted != wish["acceleration"]:
-            vehicle.action = wish | {"acceleration": granted}
+        # meta-actions compute a new command on every frame, a continuous one persists
+        nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
+        acceleration, steering = float(nominal["acceleration"]), float(nominal["steering"])
+        report, steered = self._restrict(self._scene(), acceleration, steering)
+        granted = report.acceleration if settings.overrides else acceleration
+        if settings.overrides:
+            vehicle.action = {"steering": steered, "acceleration": granted}
         if self.refused:
             report = report._replace(overridden=True, limited=False)
             self.refused = False
         self.frames_trapped += report.trapped
         self.pairs_examined += report.examined
         self.pairs_possible += report.possible
-        self._count(report, report.pairs, report.broken, granted - wish["acceleration"], 0.0)
+        self._count(report, report.pairs, report.broken, granted - acceleration, steered - steering)
         if self.record is not None:
-            command = Command(granted, float(np.arctan(0.5 * np.tan(wish["steering"]))))
+            command = Command(granted, float(np.arctan(0.5 * np.tan(steered))))
             self.record.append(Frame(tuple(self.keys), self.poses, command))
+
+    def _scene(self) -> Scene:
+        """What plans of this frame depend on."""
+        settings, road = self.settings, self.vehicle.road
+        track, threats, roads = self._look()
+        if isinstance(road, SignalisedRoad):
+            threats = self._heed_lights(road, track, threats, roads)
+        return Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt)
+
+    def _restrict(
+        self, scene: Scene, acceleration: float, steering: float, holds: bool = False
+    ) -> tuple[JunctionReport, float]:
+        """What happened on this frame, with the acceleration that is let through, and the steering angle [rad].
+
+        Args:
+          scene: `Scene`.
+          acceleration, steering: what the agent asks for.
+          holds: the plan in force is carried out instead.
+        """
+        settings = self.settings
+        report: JunctionReport = junction_frame(
+            scene,
+            self.samples,
+            self.crossings,
+            self.plan,
+            acceleration,
+            settings.entry,
+            not settings.waits_anywhere,
+            settings.examine,
+            settings.overrides,
+            holds,
+        )
+        return report, steering
 
     def act(self, action=None) -> None:
         before = getattr(self.vehicle, "target_lane_index", None)
@@ -119,9 +147,9 @@ class JunctionEgo(ShieldedEgo):
             car["wreck"] = v.crashed or not hasattr(v, "action")
             car["on"] = junction.number[v.lane_index]
             car["lane"] = car["choice"] = -1
-            heads_for = getattr(v, "target_lane_index", None)
+            heads_for, route = self._declared(v)
             if heads_for is not None:
-                car["lane"], car["choice"] = junction.number[heads_for], junction.choice(heads_for, v.route)
+                car["lane"], car["choice"] = junction.number[heads_for], junction.choice(heads_for, route)
         roads, settings = junction.roads, self.settings
         track = track_of(roads, cars[-1], self.path)
         self.path = track.path
@@ -132,6 +160,10 @@ class JunctionEgo(ShieldedEgo):
             self.room = np.zeros(2 * count, THREAT)
             count = list_threats(*common, self.room, self.box)
         return track, self.room[:count], roads
+
+    def _declared(self, vehicle) -> tuple:
+        """Lane that a driver heads for, None = nobody knows, and its route."""
+        return getattr(vehicle, "target_lane_index", None), getattr(vehicle, "route", None)
 
     def _heed_lights(self, road: SignalisedRoad, track, threats, roads):
         """Lights say who has the right of way; where the ego has not, its line is an obstacle."""

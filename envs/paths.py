@@ -14,7 +14,7 @@ from envs.fast.network import compile_network, heading_at, is_after_end, local_c
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH
 from envs.fast.steering import steering_angle
 from shield.compiled import compiled_for_arrays
-from shield.conflict_areas import CELL, Paths, find_conflicts, swept_boxes
+from shield.conflict_areas import CELL, HALF_LENGTH, HALF_WIDTH, Paths, find_conflicts, swept_boxes
 
 MARGIN_LON, MARGIN_LAT = 0.25, 0.15  # of each of two cars, beyond the tracked boxes [m]
 _SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the top speed, at which a path is driven
@@ -82,12 +82,13 @@ def _walks_from(network, walk) -> Iterator[list[tuple]]:
         yield from _walks_from(network, [*walk, index])
 
 
-def compile_paths(network, top_speed: float) -> Paths:
+def compile_paths(network, top_speed: float, room: float = 0.0) -> Paths:
     """Paths, swept widths and conflict areas of a `highway_env.road.road.RoadNetwork`.
 
     Args:
       network: the road network.
       top_speed: drivers are expected up to this speed [m/s].
+      room: the ego may be this much further to either side than these drivers [m].
     """
     indices = list(network.lanes_dict())
     number = {index: i for i, index in enumerate(indices)}
@@ -106,13 +107,16 @@ def compile_paths(network, top_speed: float) -> Paths:
         lane[p, : cells[p]] = np.array(way)[np.searchsorted(ends, np.arange(cells[p]) * CELL, side="right")]
         poses = _tracked(lanes, np.array(way), start, int(cells[p]), top_speed)
         swept_boxes(poses, CAR_LENGTH / 2, CAR_WIDTH / 2, MARGIN_LON, MARGIN_LAT, boxes[p, : cells[p]])
+    swept = boxes.copy()
+    swept[..., HALF_WIDTH] += room
+    swept[..., HALF_LENGTH] += 0.5 * room  # who turns more than they do reaches further, too
     conflicts = np.full((count, count, size, 4), np.inf, np.float32)
     conflicts[..., 1::2] = -np.inf
     first = np.full((count, count, size), np.inf, np.float32)
-    find_conflicts(boxes, cells, conflicts, first)
+    find_conflicts(swept, boxes, cells, conflicts, first)
     rank = np.where(ring | ~ring.any(), lanes["priority"], lanes["priority"] - 1)  # who is on a ring goes first
     return Paths(
-        boxes,
+        swept,
         cells,
         lane,
         offset,

@@ -2,6 +2,9 @@
 
 from typing import Any
 
+from highway_env.vehicle.controller import ControlledVehicle
+
+from envs.free_steering import FreeEgo
 from envs.highway import LANES, Frame, Settings, ShieldedEgo, StepTally, log_of, response_name
 from envs.junction_ego import JunctionEgo
 from shield.blame import Audit, audit
@@ -9,9 +12,19 @@ from shield.blame import Audit, audit
 LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
 
 
-def attach(vehicle: Any, settings: Settings, record: bool = False) -> ShieldedEgo:
-    """Put a shield on a vehicle."""
-    return (ShieldedEgo if settings.scheme == LANES else JunctionEgo)(vehicle, settings, record)
+def attach(vehicle: Any, settings: Settings, record: bool = False, destination: str = "") -> ShieldedEgo:
+    """Put a shield on a vehicle.
+
+    Args:
+      vehicle: highway-env's.
+      settings, record: see `ShieldedEgo`.
+      destination: where a car goes that is steered freely and has no route; needed where roads cross.
+    """
+    if settings.scheme == LANES:
+        return ShieldedEgo(vehicle, settings, record)
+    if isinstance(vehicle, ControlledVehicle):
+        return JunctionEgo(vehicle, settings, record)
+    return FreeEgo(vehicle, settings, record, destination)
 
 
 def begin_step(ego: ShieldedEgo) -> bool:

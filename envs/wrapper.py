@@ -16,6 +16,7 @@ from highway_env.envs.u_turn_env import UTurnEnv
 
 from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
 from envs.shielding import attach, audit_of, begin_step, end_step, info_of
+from envs.signalised import SignalisedIntersectionEnv
 from envs.traffic import TRAFFIC, shield_everybody
 from shield.blame import Audit
 from shield.examined import EXAMINED
@@ -28,7 +29,7 @@ MODES = ("override", "monitor")
 WAITING = ("line", "anywhere")
 SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
-    "roundabout-generic-v0, intersection-v0/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
+    "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
 )
 _SCHEMES = {
     **dict.fromkeys((HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv, UTurnEnv), LANES),
@@ -181,7 +182,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
     def _attach(self) -> None:
         env: Any = self.env.unwrapped
         settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
-        self._ego = attach(env.vehicle, settings, self.record)
+        self._ego = attach(env.vehicle, settings, self.record, env.config.get("destination"))
         self._drivers: list[ShieldedEgo] = []
         self._welcome()
 
@@ -231,12 +232,27 @@ def check_action_type(action_type: Any, env: Any) -> None:
             f"action type {type(action_type).__name__} is not supported; "
             "expected DiscreteMetaAction, ContinuousAction or DiscreteAction"
         )
-    if getattr(action_type, "dynamical", False):
-        raise ValueError("action option dynamical = True is not supported; expected False")
-    if scheme_of(env) != LANES and not isinstance(action_type, DiscreteMetaAction):
+    if isinstance(action_type, ContinuousAction):
+        _check_free_driving(action_type, env)
+
+
+def _check_free_driving(action_type: ContinuousAction, env: Any) -> None:
+    lowest = (action_type.speed_range or (0.0,))[0]
+    if lowest > 0.0:
+        raise ValueError(f"action option speed_range starts at {lowest:g} m/s: expected <= 0, or nobody could stop")
+    if scheme_of(env) == LANES:
+        if action_type.dynamical:
+            raise ValueError("action option dynamical = True is supported at intersections only; expected False")
+        return
+    if not isinstance(env, IntersectionEnv) or isinstance(env, SignalisedIntersectionEnv):
         raise ValueError(
-            f"action type {type(action_type).__name__} is not supported where roads cross, because a car that is "
-            "steered freely may leave the route it has declared; expected DiscreteMetaAction"
+            f"action type {type(action_type).__name__} is not supported on {type(env).__name__}, because a car that is "
+            "steered freely may leave its route there; expected DiscreteMetaAction"
+        )
+    if not env.config["destination"]:
+        raise ValueError(
+            f"config destination = {env.config['destination']!r}: expected a node such as 'o1', because a car that is "
+            "steered freely has to declare its route"
         )
 
 

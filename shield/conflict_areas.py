@@ -20,7 +20,7 @@ _NOTHING = np.inf
 class Paths(NamedTuple):
     """All paths of a road network. P paths of at most C cells, L lanes, at most T paths through a lane."""
 
-    boxes: np.ndarray  # `[P, C, 6]` swept box of each cell
+    boxes: np.ndarray  # `[P, C, 6]` what the ego sweeps in each cell
     cells: np.ndarray  # `[P]` cells of each path
     lane: np.ndarray  # `[P, C]` lane that a car in the cell follows
     offset: np.ndarray  # `[P, L]` arc length at which a lane begins on a path, nan = not part of it [m]
@@ -89,11 +89,12 @@ def swept_boxes(poses, half_length, half_width, margin_lon, margin_lat, out):
 
 
 @compiled_for_arrays
-def find_conflicts(boxes, cells, conflicts, first):
+def find_conflicts(boxes, others, cells, conflicts, first):
     """Fill in `Paths.conflicts` and `Paths.first`.
 
     Args:
-      boxes, cells: as in `Paths`.
+      boxes: `[P, C, 6]` swept by the ego on each path, others: likewise by everybody else.
+      cells: as in `Paths`.
       conflicts: `[P, P, C, 4]`, first: `[P, P, C]`, overwritten.
     """
     paths = len(cells)
@@ -104,7 +105,7 @@ def find_conflicts(boxes, cells, conflicts, first):
                 interval = conflicts[a, b, i]
                 interval[0] = interval[2] = _NOTHING
                 interval[1] = interval[3] = -_NOTHING
-                _conflicts_of_cell(boxes[a, i], boxes[b], cells[b], interval)
+                _conflicts_of_cell(boxes[a, i], others[b], cells[b], interval)
                 nearest = min(nearest, interval[0])
                 first[a, b, i] = nearest
 

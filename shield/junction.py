@@ -36,6 +36,7 @@ from shield.examined import TABLE, count_examined, examine, is_left_out
 from shield.plans import (
     GO,
     NEVER,
+    SLACK,
     STOP,
     Scene,
     begin,
@@ -52,7 +53,6 @@ from shield.plans import (
 
 CAUTIOUS, PRIORITY, ASSERTIVE = range(3)  # whom the ego expects to give way: nobody, who must, who can
 ENTRIES = ("cautious", "priority", "assertive")
-SLACK = 0.2  # a new plan stays clear even if the ego is this far off; one in force only has to stay clear [m]
 _IMMINENT = 2.0  # [s]
 _TOLERANCE = 1e-6
 _REVERSING = 0.1  # slower than this backwards is standing [m/s]
@@ -118,7 +118,7 @@ class JunctionReport(NamedTuple):
 
 
 @compiled
-def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides):
+def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides, holds=False):
     """Restrict the ego's acceleration to what leaves it a plan, and judge everybody.
 
     Args:
@@ -131,16 +131,17 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
       at_line: the ego may rest only where it is in nobody's way, whoever may come.
       which: against whom plans are checked, index into `shield.examined.EXAMINED`.
       overrides: False = watch only.
+      holds: the plan in force is carried out, whatever the controller asks for.
 
     Returns:
       `JunctionReport`.
     """
     sort_out(scene, memory, entry)
-    examine(scene, samples, which, SLACK)
+    examine(scene, samples, which, SLACK + scene.drift)
     limited = limit(nominal, scene.track.v, scene.ego, scene.dt)
     a, clear, trapped = limited, False, False
     if overrides:
-        a, clear, trapped = _choose(scene, plan, limited, at_line)
+        a, clear, trapped = _choose(scene, plan, limited, at_line, holds)
     pairs = broken = 0
     for i in range(len(samples)):
         known = clear and (which <= TABLE or not is_left_out(scene, i))
@@ -174,9 +175,9 @@ def has_plan(scene, memory, entry, at_line):
             return False
     sort_out(scene, memory, entry)
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
-    if stop_conflict(scene, brake, -1, at_line, SLACK) == NEVER:
+    if stop_conflict(scene, brake, -1, at_line, SLACK + scene.drift) == NEVER:
         return True
-    return go_plan(scene, throttle(scene, scene.track.s, scene.track.v), -1, at_line, SLACK)[0] >= 0
+    return go_plan(scene, throttle(scene, scene.track.s, scene.track.v), -1, at_line, SLACK + scene.drift)[0] >= 0
 
 
 @merged
@@ -229,15 +230,16 @@ def _entered(paths, path, s):
 
 
 @compiled
-def _choose(scene, plan, a, at_line):
+def _choose(scene, plan, a, at_line, holds):
     """Acceleration of this frame, whether a plan remains, and whether none is left to the ego."""
-    if stop_conflict(scene, a, -1, at_line, SLACK) == NEVER:
-        plan.go = 0
-        return a, True, False
-    go, _ = go_plan(scene, a, -1, at_line, SLACK)
-    if go >= 0:
-        plan.go = go
-        return a, True, False
+    if not holds:
+        if stop_conflict(scene, a, -1, at_line, SLACK + scene.drift) == NEVER:
+            plan.go = 0
+            return a, True, False
+        go, _ = go_plan(scene, a, -1, at_line, SLACK + scene.drift)
+        if go >= 0:
+            plan.go = go
+            return a, True, False
     go_now = throttle(scene, scene.track.s, scene.track.v)
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
     if plan.go >= 0 and plan_conflict(scene, plan.go, -1, 0.0) == NEVER:
@@ -333,7 +335,7 @@ def _alone_with(scene, i):
     for k in range(len(scene.threats)):
         if scene.threats[k].user == i:
             first, last = min(first, k), k + 1
-    return Scene(scene.paths, scene.track, scene.threats[first:last], scene.ego, scene.other, scene.dt)
+    return Scene(scene.paths, scene.track, scene.threats[first:last], scene.ego, scene.other, scene.dt, scene.drift)
 
 
 @merged

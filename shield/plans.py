@@ -28,6 +28,7 @@ STOP, GO = 1, 2  # kinds of plans
 KNOWN, STRAIGHT, ANY = range(3)  # what is known of the ways that others take: see `INTENTS`
 INTENTS = ("known", "straight", "any")
 NEVER = 1 << 30  # frame of something that does not happen
+SLACK = 0.2  # a new plan stays clear even if the ego is this far off; one in force only has to stay clear [m]
 _SHORT_CUT = 1.0  # a car that cuts the corners of its path gains or loses at most this ...
 _SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
 _REVERSE = 1.0  # a car that reverses may go on for this long [s]
@@ -82,6 +83,7 @@ class Scene(NamedTuple):
     ego: RSSParams
     other: RSSParams
     dt: float  # length of a frame [s]
+    drift: float = 0.0  # the ego may come this much further, or less far, than a plan says [m]
 
 
 # ---------------------------------------------------------------- where others may be
@@ -281,7 +283,7 @@ def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
       slack: how exactly the ego is known to follow the plan [m].
     """
     paths, path = scene.paths, scene.track.path
-    rest = s + v * scene.dt + stopping_distance(v, brake)
+    rest = s + v * scene.dt + stopping_distance(v, brake) + scene.drift
     if at_line and paths.crossed[path, cell_of(rest, paths.cells[path])]:
         return n
     for k in range(len(scene.threats)):

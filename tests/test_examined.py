@@ -11,8 +11,8 @@ from envs import make, make_vec
 from shield.conflict_areas import cell_of
 from shield.examined import ALL, EXAMINED, FIRST, FIRST_CONFLICTING, GEOFENCE, RADIUS, WALK, count_examined, examine
 from shield.examined import TABLE as TABLE_ONLY
-from shield.junction import SAMPLE, SLACK
-from shield.plans import THREAT, Scene, Track
+from shield.junction import SAMPLE
+from shield.plans import SLACK, THREAT, Scene, Track
 
 ENV_ID, FASTER = "intersection-v0", 2
 
