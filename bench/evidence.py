@@ -120,6 +120,9 @@ def _cases() -> dict[str, Case]:
             cases[f"{name}-{policy}"] = Case(env_id, policy, 300, {})
             if "intersection" in name or "roundabout" in name:
                 cases[f"{name}-{policy}-known"] = Case(env_id, policy, 300, {}, {"intent": "known"})
+    for policy in ("continuous", "full-throttle"):
+        cases[f"intersection-v1-{policy}"] = Case("intersection-v1", policy, 300, {})
+        cases[f"intersection-v1-{policy}-known"] = Case("intersection-v1", policy, 300, {}, {"intent": "known"})
     reckless = {"other_vehicles_type": RECKLESS}
     cases["reckless-random"] = Case("highway-fast-v0", "random", 200, reckless)
     cases["reckless-full-throttle"] = Case("highway-fast-v0", "full-throttle", 200, reckless | CONTINUOUS)
