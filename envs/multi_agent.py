@@ -132,8 +132,8 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
     def _attach(self) -> None:
         env: Any = self.env.unwrapped
         self._settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
-        goal = env.config.get("destination")
-        self._egos = [attach(vehicle, self._settings, self.record, goal) for vehicle in env.controlled_vehicles]
+        goal, among = env.config.get("destination"), self.traffic == "compliant"
+        self._egos = [attach(vehicle, self._settings, self.record, goal, among) for vehicle in env.controlled_vehicles]
         self._drivers: list[ShieldedEgo] = []
         self._welcome()
 

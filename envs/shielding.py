@@ -4,6 +4,7 @@ from typing import Any
 
 from highway_env.vehicle.controller import ControlledVehicle
 
+from envs.compliant import TurnTaker
 from envs.free_steering import FreeEgo
 from envs.highway import LANES, Frame, Settings, ShieldedEgo, StepTally, log_of, response_name
 from envs.junction_ego import JunctionEgo
@@ -12,19 +13,22 @@ from shield.blame import Audit, audit
 LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
 
 
-def attach(vehicle: Any, settings: Settings, record: bool = False, destination: str = "") -> ShieldedEgo:
+def attach(
+    vehicle: Any, settings: Settings, record: bool = False, destination: str = "", takes_turns: bool = False
+) -> ShieldedEgo:
     """Put a shield on a vehicle.
 
     Args:
       vehicle: highway-env's.
       settings, record: see `ShieldedEgo`.
       destination: where a car goes that is steered freely and has no route; needed where roads cross.
+      takes_turns: it is among compliant drivers.
     """
     if settings.scheme == LANES:
         return ShieldedEgo(vehicle, settings, record)
-    if isinstance(vehicle, ControlledVehicle):
-        return JunctionEgo(vehicle, settings, record)
-    return FreeEgo(vehicle, settings, record, destination)
+    if not isinstance(vehicle, ControlledVehicle):
+        return FreeEgo(vehicle, settings, record, destination)
+    return (TurnTaker if takes_turns and settings.overrides else JunctionEgo)(vehicle, settings, record)
 
 
 def begin_step(ego: ShieldedEgo) -> bool:

@@ -9,9 +9,11 @@ from typing import Any
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.controller import ControlledVehicle
 
-from envs.highway import Settings, ShieldedEgo
+from envs.compliant import CompliantDriver, take_turns
+from envs.highway import LANES, Settings, ShieldedEgo
 from envs.shielding import attach
 from shield.junction import PRIORITY
+from shield.plans import KNOWN
 
 RECKLESS = "envs.traffic.RecklessVehicle"
 TRAFFIC = ("stock", "compliant")
@@ -33,8 +35,8 @@ def shield_everybody(road: Any, drivers: list[ShieldedEgo], settings: Settings) 
     """Compliant traffic: a shield for every car that has none yet.
 
     Where everybody keeps their duties there are no crashes (Lemmas 5 and 6), apart from dangers that cars
-    appear in. At junctions these drivers expect way only of who must give it and still can (Def. 17, item 1):
-    the right of way breaks the tie, and of two equal roads nobody relies on the other.
+    appear in. At junctions these drivers share their routes and take turns (`envs.compliant`); of anybody else they
+    expect way only if they must give it and still can (Def. 17, item 1).
 
     Cars may appear at any time, so this is called at reset and before every step.
 
@@ -49,4 +51,8 @@ def shield_everybody(road: Any, drivers: list[ShieldedEgo], settings: Settings) 
     duties = settings._replace(overrides=True, entry=PRIORITY)
     stay = [driver for driver in drivers if driver.contact or driver.vehicle in road.vehicles]
     unshielded = [v for v in road.vehicles if isinstance(v, ControlledVehicle) and "act" not in vars(v)]
-    return stay + [attach(vehicle, duties) for vehicle in unshielded]
+    if settings.scheme == LANES:
+        return stay + [attach(vehicle, duties) for vehicle in unshielded]
+    new = [CompliantDriver(vehicle, duties._replace(intent=KNOWN)) for vehicle in unshielded]
+    take_turns(road)
+    return stay + new

@@ -182,7 +182,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
     def _attach(self) -> None:
         env: Any = self.env.unwrapped
         settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
-        self._ego = attach(env.vehicle, settings, self.record, env.config.get("destination"))
+        goal, among = env.config.get("destination"), self.traffic == "compliant"
+        self._ego = attach(env.vehicle, settings, self.record, goal, among)
         self._drivers: list[ShieldedEgo] = []
         self._welcome()
 

@@ -8,9 +8,11 @@ from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from envs import make
+from envs.compliant import GAP, CompliantDriver, TurnTaker, shield_of
 from envs.highway import ShieldedEgo
-from envs.junction_ego import JunctionEgo
-from shield.junction import CAUTIOUS, PRIORITY
+from shield.conflict_areas import CELL
+from shield.junction import ASSERTIVE, CAUTIOUS, PRIORITY
+from shield.plans import ANY, KNOWN
 
 
 def crashes(env, seeds):
@@ -40,14 +42,114 @@ def test_nobody_crashes_at_an_intersection_where_everybody_complies():
     assert crashes(make("intersection-v0", config=short), STOCK_CRASHES) > 0
 
 
+def heeded(shield):
+    """Whom a driver's plans stay clear of."""
+    return [shield.others[threat["user"]] for threat in shield._look()[1] if threat["user"] >= 0]
+
+
+def all_get_through(env, seed):
+    """Is the agent alone after 24 s, if nobody comes any more?"""
+    env.reset(seed=seed)
+    for _ in range(24):
+        env.step(2)
+    return env.unwrapped.road.vehicles == [env.unwrapped.vehicle]
+
+
+def test_traffic_flows_and_locks_up_if_nobody_takes_turns(monkeypatch):
+    env = make("intersection-v0", traffic="compliant", config={"spawn_probability": 0.0})
+    assert all_get_through(env, 1)
+    monkeypatch.setattr(TurnTaker, "_may_rely_on", lambda *_: False)
+    assert not all_get_through(env, 1)
+
+
+def test_an_agent_that_relies_on_nobody_is_left_a_gap():
+    """At seed 4 it would wait for more than 40 s: somebody always comes."""
+    env = make("intersection-v0", traffic="compliant", config={"duration": 20})
+    env.reset(seed=4)
+    waited, done = 0, False
+    while not done:
+        *_, terminated, truncated, info = env.step(2)
+        done = terminated or truncated
+        waiting = [driver for driver in env.drivers if driver.holds]
+        waited += len(waiting)
+        assert all(driver.to_junction >= GAP - CELL for driver in waiting)
+    assert waited
+    assert info["is_success"]
+
+
+def test_turns_are_a_lasting_order_and_of_two_cars_one_stays_clear_of_the_other():
+    env = make("intersection-v0", traffic="compliant")
+    env.reset(seed=2)
+    first_seen = {}
+    for _ in range(8):
+        shields = [shield for shield in map(shield_of, env.unwrapped.road.vehicles) if shield]
+        turns = {id(shield): shield.turn for shield in shields if shield.turn > 0}
+        assert len({*turns.values()}) == len(turns) > 0
+        assert first_seen.items() <= {**first_seen, **turns}.items()
+        first_seen |= turns
+        for one in shields:
+            for other in shields:
+                if other.turn > one.turn and {one.vehicle, other.vehicle} <= {*one.others, *other.others}:
+                    assert one.vehicle in heeded(other) or other.vehicle in heeded(one)
+                    same_lane = one.vehicle.lane_index == other.vehicle.lane_index
+                    assert not same_lane or one.turn == 0 or one.vehicle.lane_distance_to(other.vehicle) < 0.0
+        env.step(2)
+
+
+def test_who_queues_behind_an_agent_that_lets_everybody_go_first_has_no_turn_before_it_has_gone():
+    """At seed 116 everybody would wait: the agent for cars at their lines, these for the one behind the agent."""
+    env = make("intersection-v0", traffic="compliant")
+    env.reset(seed=116)
+    agent = env.unwrapped.vehicle
+    for _ in range(8):
+        env.step(2)
+    behind = min((d for d in env.drivers if d.vehicle.lane_index[0] == "o0"), key=lambda d: -d.progress())
+    assert behind.vehicle.lane_index == ("o0", "ir0", 0)
+    assert behind.turn == 0
+    assert agent in heeded(behind)
+    assert all(behind.vehicle not in heeded(d) for d in env.drivers if d.turn and behind.vehicle in d.others)
+
+
+def test_nobody_relies_on_who_has_no_plan_or_does_not_wait_for_its_turn():
+    env = make("intersection-v0", traffic="compliant")
+    env.reset(seed=2)
+    env.step(2)
+    last = max((d for d in env.drivers if d.frames), key=lambda driver: driver.turn)
+    first = next(d for d in env.drivers if last.vehicle in d.others and last.vehicle not in heeded(d))
+    for change in ("trapped", "assertive", "contact"):
+        settings = last.settings
+        if change == "trapped":
+            last.trapped = True
+        elif change == "assertive":
+            last.settings = settings._replace(entry=ASSERTIVE)
+        else:
+            last.contact = {"verdict": "other"}
+        assert last.vehicle in heeded(first)
+        last.trapped, last.settings, last.contact = False, settings, None
+        assert last.vehicle not in heeded(first)
+
+
+def test_an_agent_takes_its_turn_unless_it_is_cautious():
+    for entry in ("cautious", "priority"):
+        env = make("intersection-v0", traffic="compliant", entry=entry)
+        env.reset(seed=2)
+        env.step(2)
+        agent = shield_of(env.unwrapped.vehicle)
+        later = {driver.vehicle for driver in env.drivers if driver.turn > agent.turn} & {*agent.others}
+        assert later
+        assert later <= {*heeded(agent)} if entry == "cautious" else not later <= {*heeded(agent)}
+
+
 def test_every_other_car_has_a_shield_and_expects_way_only_of_who_must_give_it():
     env = make("intersection-v0", traffic="compliant", shield="monitor")
     env.reset(seed=0)
     others = [v for v in env.unwrapped.road.vehicles if v is not env.unwrapped.vehicle]
     assert [driver.vehicle for driver in env.drivers] == others
-    assert all(isinstance(driver, JunctionEgo) for driver in env.drivers)
+    assert all(isinstance(driver, CompliantDriver) for driver in env.drivers)
+    assert all(driver.settings.intent == KNOWN for driver in env.drivers)
     assert all(driver.settings.entry == PRIORITY and driver.settings.overrides for driver in env.drivers)
     assert env.settings.entry == CAUTIOUS
+    assert env.settings.intent == ANY
     assert not env.settings.overrides
 
 
