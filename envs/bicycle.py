@@ -101,25 +101,27 @@ def move(state, acceleration, steering, dynamical, dt):
 
 @compiled
 def _slide(state, acceleration, steering, dt):
-    """One step of Runge and Kutta for `BicycleVehicle`: a bicycle whose tyres slip."""
+    """One step of Runge and Kutta for `BicycleVehicle`: a bicycle whose tyres slip.
+
+    Speeds are computed in its own order: they fall on `_CREEP` exactly, and their last bit decides on which side.
+    """
     steering = min(max(steering, -_MAX_STEERING), _MAX_STEERING)
-    rate = min(max(state[YAW_RATE], -_MAX_YAW_RATE), _MAX_YAW_RATE)
-    heading, v, w = state[HEADING], state[SPEED], state[LATERAL_SPEED]
-    a = acceleration
-    x1, y1, w1, r1 = _slopes(heading, v, w, rate, steering)
-    half = 0.5 * dt
-    x2, y2, w2, r2 = _slopes(heading + half * rate, v + half * a, w + half * w1, rate + half * r1, steering)
-    rate2 = rate + half * r1
-    x3, y3, w3, r3 = _slopes(heading + half * rate2, v + half * a, w + half * w2, rate + half * r2, steering)
-    rate3 = rate + half * r2
-    x4, y4, w4, r4 = _slopes(heading + dt * rate3, v + dt * a, w + dt * w3, rate + dt * r3, steering)
-    rate4 = rate + dt * r3
+    heading, v, w, a = state[HEADING], state[SPEED], state[LATERAL_SPEED], acceleration
+    r1 = min(max(state[YAW_RATE], -_MAX_YAW_RATE), _MAX_YAW_RATE)
+    half = dt / 2
+    x1, y1, dw1, dr1 = _slopes(heading, v, w, r1, steering)
+    r2 = r1 + dr1 * half
+    x2, y2, dw2, dr2 = _slopes(heading + r1 * half, v + a * half, w + dw1 * half, r2, steering)
+    r3 = r1 + dr2 * half
+    x3, y3, dw3, dr3 = _slopes(heading + r2 * half, v + a * half, w + dw2 * half, r3, steering)
+    r4 = r1 + dr3 * dt
+    x4, y4, dw4, dr4 = _slopes(heading + r3 * dt, v + a * dt, w + dw3 * dt, r4, steering)
     state[X] += dt / 6 * (x1 + 2 * x2 + 2 * x3 + x4)
     state[Y] += dt / 6 * (y1 + 2 * y2 + 2 * y3 + y4)
-    state[HEADING] += dt / 6 * (rate + 2 * rate2 + 2 * rate3 + rate4)
-    state[SPEED] = v + dt * a
-    state[LATERAL_SPEED] = w + dt / 6 * (w1 + 2 * w2 + 2 * w3 + w4)
-    state[YAW_RATE] = rate + dt / 6 * (r1 + 2 * r2 + 2 * r3 + r4)
+    state[HEADING] += dt / 6 * (r1 + 2 * r2 + 2 * r3 + r4)
+    state[SPEED] = v + dt / 6 * (a + 2 * a + 2 * a + a)
+    state[LATERAL_SPEED] = w + dt / 6 * (dw1 + 2 * dw2 + 2 * dw3 + dw4)
+    state[YAW_RATE] = r1 + dt / 6 * (dr1 + 2 * dr2 + 2 * dr3 + dr4)
 
 
 @compiled

@@ -7,7 +7,6 @@ the simulator's own equations of motion, kinematic or dynamical. What was let th
 future, so there is always something to carry out: the plan in force, steered by that law.
 """
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ class FreeEgo(JunctionEgo):
 
     Args:
       vehicle, settings, record: see `ShieldedEgo`.
-      destination: name of the node where the ego goes; the shortest way there is its route.
+      destination: name of the node where the ego goes; the way there is its route.
 
     Raises:
       ValueError: no way leads there.
@@ -47,7 +46,7 @@ class FreeEgo(JunctionEgo):
     def __init__(self, vehicle: Any, settings: Settings, record: bool, destination: str) -> None:
         super().__init__(vehicle, settings, record)
         self.junction = junction_of(vehicle.road.network, ROOM)
-        self.route = declared_route(vehicle.road.network, vehicle.lane_index, destination)
+        self.route = declared_route(self.junction.walks, vehicle.lane_index, destination)
         self.passed = 0  # lanes of the route that lie behind
         self.dynamical = isinstance(vehicle, BicycleVehicle)
         self.astray = False  # has left its route: only where nothing is overridden
@@ -121,23 +120,23 @@ class FreeEgo(JunctionEgo):
         return report._replace(pairs=len(self.crossings), broken=len(self.crossings))
 
 
-def declared_route(network, start: tuple, destination: str) -> list[tuple]:
-    """Lanes from the lane `start` to a node.
+def declared_route(walks: list[list[tuple]], start: tuple, destination: str) -> list[tuple]:
+    """Lanes from the lane `start` to a node and beyond.
+
+    Args:
+      walks: all ways through the network, see `envs.paths.walks`.
 
     Raises:
       ValueError: no way leads there.
     """
-    nodes = network.shortest_path(start[1], destination) if destination in _nodes(network) else []
-    if len(nodes) < 2:
+    ahead = [walk[walk.index(start) :] for walk in walks if start in walk]
+    there = [walk for walk in ahead if destination in {lane[1] for lane in walk[1:]}]
+    if not there:
         raise ValueError(
-            f"config destination = {destination!r}: expected a node that a car on {start[0]!r} can drive to, because a "
-            "car that is steered freely has to declare its route"
+            f"config destination = {destination!r}: expected a node that a car from {start[0]!r} can drive to, because "
+            "a car that is steered freely has to declare its route"
         )
-    return [start, *((a, b, 0) for a, b in pairwise(nodes))]
-
-
-def _nodes(network) -> set[str]:
-    return {*network.graph, *(end for ends in network.graph.values() for end in ends)}
+    return min(there, key=len)
 
 
 # ---------------------------------------------------------------- the future, played ahead

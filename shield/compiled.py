@@ -1,6 +1,7 @@
 """How the functions of this package are compiled, and when again."""
 
 from collections.abc import Callable
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     The cache on disk knows what a function is made of: compiled functions contain the ones they
     call, but numba looks at the time stamp of the function's own file alone, and after an edit
     elsewhere it would go on with the old code. A shield must never do that, so any change in the
-    package compiles everything anew.
+    package, or in that of the function, compiles everything anew.
     """
     return _stamped(_njit(cache=True, error_model="numpy", _nrt=False)(function))
 
@@ -44,10 +45,13 @@ def compiled_for_arrays(function: Callable[..., Any]) -> Any:
 
 
 def _stamped(dispatcher: Any) -> Any:
-    source = Path(dispatcher.py_func.__code__.co_filename)
-    engine = (source.parent / "fast").glob("*.py")  # what adapters call besides this package
-    dispatcher._cache._cache_file._source_stamp = fingerprint(source, *engine)
+    dispatcher._cache._cache_file._source_stamp = _stamp(Path(dispatcher.py_func.__code__.co_filename).parent)
     return dispatcher
+
+
+@cache
+def _stamp(folder: Path) -> str:
+    return fingerprint(*folder.rglob("*.py"))
 
 
 def choose(condition: Any, this: Any, that: Any) -> Any:
