@@ -20,7 +20,7 @@ from envs.junction_ego import JunctionEgo, junction_of
 from envs.paths import MARGIN_LAT, MARGIN_LON
 from shield.blame import KEPT, LEFT_PATHS
 from shield.compiled import compiled
-from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, X, Y, cell_of
+from shield.conflict_areas import cell_of, reach_beyond
 from shield.junction import JunctionReport
 from shield.plans import Scene, throttle
 
@@ -186,12 +186,6 @@ def _is_on_route(scene, lane, number, state):
     """Is the whole car inside the ego's widened path? Where that ends, it goes on straight."""
     paths, path = scene.paths, scene.track.path
     i = cell_of(paths.offset[path, number] + _arc_length(lane, state), paths.cells[path])
-    box = paths.boxes[path, i]
-    dx, dy = state[0] - box[X], state[1] - box[Y]
-    along, across = dx * box[COS] + dy * box[SIN], dy * box[COS] - dx * box[SIN]
-    cos, sin = np.cos(state[HEADING]), np.sin(state[HEADING])
-    turn_cos, turn_sin = abs(cos * box[COS] + sin * box[SIN]), abs(sin * box[COS] - cos * box[SIN])
-    long, wide = 0.5 * CAR_LENGTH, 0.5 * CAR_WIDTH
-    beside = abs(across) + long * turn_sin + wide * turn_cos - (box[HALF_WIDTH] - MARGIN_LAT)
-    beyond = abs(along) + long * turn_cos + wide * turn_sin - (box[HALF_LENGTH] - MARGIN_LON)
-    return beside <= 0.0 and (beyond <= 0.0 or i == paths.cells[path] - 1)
+    pose = state[0], state[1], state[HEADING]
+    along, across = reach_beyond(paths.boxes[path, i], *pose, 0.5 * CAR_LENGTH, 0.5 * CAR_WIDTH)
+    return across <= -MARGIN_LAT and (along <= -MARGIN_LON or i == paths.cells[path] - 1)

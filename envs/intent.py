@@ -12,7 +12,7 @@ import numpy as np
 from envs.fast.network import LANE, compile_network, heading_at, local_coordinates
 from envs.paths import beside, compile_paths, lead_of, successors_of, walks
 from shield.compiled import compiled
-from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y
+from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y, cell_of, reach_beyond
 from shield.geometry import wrap_angle
 from shield.junction import block
 from shield.plans import KNOWN, STRAIGHT, Track
@@ -70,6 +70,7 @@ def no_roads() -> Roads:
             none,
             none.astype(bool),
             np.zeros((0, 0)),
+            np.zeros((0, 0, 6)),
         ),
         np.zeros(0, LANE),
         none,
@@ -281,6 +282,21 @@ def _add(roads, track, lane, row, i, car, v_cap, threats, count):
             threat.priority, threat.red_for = roads.paths.priority[track.path, path], 0.0
         count += 1
     return count
+
+
+@compiled
+def is_outside(paths, threats, i, car):
+    """Does a car reach beyond what cars sweep on every way it may take? Not asked of obstacles."""
+    outside = False
+    for k in range(len(threats)):
+        threat = threats[k]
+        if threat.user == i and threat.path >= 0:
+            box = paths.swept[threat.path, cell_of(threat.s, paths.cells[threat.path])]
+            along, across = reach_beyond(box, car.x, car.y, car.heading, 0.5 * car.length, 0.5 * car.width)
+            if along <= 0.0 and across <= 0.0:
+                return False
+            outside = True
+    return outside
 
 
 @compiled

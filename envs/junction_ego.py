@@ -4,7 +4,7 @@ import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.highway import Frame, Settings, ShieldedEgo
-from envs.intent import CAR_ON_ROAD, Junction, list_threats, track_of
+from envs.intent import CAR_ON_ROAD, Junction, is_outside, list_threats, track_of
 from envs.signalised import SignalisedRoad
 from shield.blame import Verdict
 from shield.command import Command
@@ -50,6 +50,7 @@ class JunctionEgo(ShieldedEgo):
         self.junction = junction_of(vehicle.road.network)
         self.crossings = np.zeros(0, CROSSING)
         self.samples = np.zeros(0, SAMPLE)
+        self.cars = np.zeros(0, CAR_ON_ROAD)  # everybody on this sample, the ego last
         self.plan = np.zeros(1, PLAN)[0]
         self.plan["go"] = -1
         self.room = np.zeros(64, THREAT)
@@ -140,7 +141,7 @@ class JunctionEgo(ShieldedEgo):
     def _look(self):
         """The ego's track, the ways of all others, and the roads."""
         vehicle, junction = self.vehicle, self.junction
-        cars = np.zeros(len(self.others) + 1, CAR_ON_ROAD)
+        cars = self.cars = np.zeros(len(self.others) + 1, CAR_ON_ROAD)
         for car, v in zip(cars, [*self.others, vehicle], strict=True):
             car["x"], car["y"] = v.position
             car["heading"], car["speed"], car["length"], car["width"] = v.heading, v.speed, v.LENGTH, v.WIDTH
@@ -218,9 +219,13 @@ class JunctionEgo(ShieldedEgo):
         super()._follow(others)
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:
-        self._look()
+        _, threats, roads = self._look()
         other, dt = self.settings.other, self.settings.dt
-        return [judge_crossing(self.samples[i], self.crossings[i], other, dt) for i in touching]
+        outside = [is_outside(roads.paths, threats, i, self.cars[i]) for i in touching]
+        return [
+            judge_crossing(self.samples[i], self.crossings[i], out, other, dt)
+            for i, out in zip(touching, outside, strict=True)
+        ]
 
     def _danger(self, i: int, kind: int) -> str:
         return PLAN_NAMES[kind]

@@ -125,6 +125,7 @@ def compile_paths(network, top_speed: float, room: float = 0.0) -> Paths:
         _priorities(lane, offset, conflicts, rank),
         _crossed(lane, offset, conflicts),
         np.where(lane >= 0, lanes["speed_limit"][lane], np.inf),
+        boxes,
     )
 
 

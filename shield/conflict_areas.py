@@ -29,6 +29,7 @@ class Paths(NamedTuple):
     priority: np.ndarray  # `[P, P]` +1: the first has the right of way over the second, -1: the other way round
     crossed: np.ndarray  # `[P, C]` a car standing there is in the way of a path that it is not on
     speed_limit: np.ndarray  # `[P, C]` [m/s], inf = none
+    swept: np.ndarray  # `[P, C, 6]` what others sweep in each cell
 
 
 @compiled
@@ -48,6 +49,16 @@ def boxes_overlap(a, b, margin):
         or abs(dx * b[COS] + dy * b[SIN]) > b[HALF_LENGTH] + margin + a[HALF_LENGTH] * cos + a[HALF_WIDTH] * sin
         or abs(dy * b[COS] - dx * b[SIN]) > b[HALF_WIDTH] + margin + a[HALF_LENGTH] * sin + a[HALF_WIDTH] * cos
     )
+
+
+@compiled
+def reach_beyond(box, x, y, heading, half_length, half_width):
+    """How far a car reaches beyond a box: along and across it, negative = not at all [m]."""
+    dx, dy, cos, sin = x - box[X], y - box[Y], np.cos(heading), np.sin(heading)
+    turn_cos, turn_sin = abs(cos * box[COS] + sin * box[SIN]), abs(sin * box[COS] - cos * box[SIN])
+    along = abs(dx * box[COS] + dy * box[SIN]) + half_length * turn_cos + half_width * turn_sin
+    across = abs(dy * box[COS] - dx * box[SIN]) + half_length * turn_sin + half_width * turn_cos
+    return along - box[HALF_LENGTH], across - box[HALF_WIDTH]
 
 
 @compiled_for_arrays

@@ -142,6 +142,8 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
     a, clear, trapped = limited, False, False
     if overrides:
         a, clear, trapped = _choose(scene, plan, limited, at_line, holds)
+        if trapped:
+            a = _least_harm(scene, a, len(samples))
     pairs = broken = 0
     for i in range(len(samples)):
         known = clear and (which <= TABLE or not is_left_out(scene, i))
@@ -251,7 +253,7 @@ def _choose(scene, plan, a, at_line, holds):
 
 @compiled
 def _escape(scene, plan, go_now, brake):
-    """Somebody left their bounds, or appeared: the plan that stays clear of everybody for longest."""
+    """Somebody left their bounds, or appeared: a plan that stays clear of everybody, or for longest."""
     stop_at = stop_conflict(scene, brake, -1, False, 0.0)
     if stop_at == NEVER:
         plan.go = 0
@@ -268,6 +270,30 @@ def _escape(scene, plan, go_now, brake):
     if max(stop_at, hard_at) * scene.dt < _IMMINENT and go_at > max(stop_at, hard_at):
         return go_now, False, True
     return (limit(-ego.a_max_brake, track.v, ego, scene.dt) if hard_at > stop_at else brake), False, True
+
+
+@compiled
+def _least_harm(scene, a, users):
+    """Of what is left to a trapped ego, what breaks the fewest duties; `a` if nothing breaks fewer [m/s^2]."""
+    brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
+    best, fewest = a, _duties_broken(scene, a, users)
+    if fewest > 0:
+        for other in (brake, throttle(scene, scene.track.s, scene.track.v)):
+            broken = _duties_broken(scene, other, users)
+            if broken < fewest:
+                best, fewest = other, broken
+    return best
+
+
+@compiled
+def _duties_broken(scene, a, users):
+    """How many road users would an acceleration leave no plan toward, though there is one now?"""
+    broken = 0
+    for i in range(users):
+        alone = _alone_with(scene, i)
+        items = _plans_now(alone, i)
+        broken += items != 0 and not _is_kept(alone, i, a, items)
+    return broken
 
 
 # ---------------------------------------------------------------- who broke a duty: Def. 27
@@ -401,17 +427,20 @@ def _is_kept(scene, i, a, items):
 
 
 @compiled
-def judge_crossing(sample, memory, other, dt):
+def judge_crossing(sample, memory, outside, other, dt):
     """Verdict at the first contact with one road user (Def. 27).
 
     Args:
       sample: SAMPLE at the sample at which there is contact or it is predicted.
       memory: CROSSING after the one before.
+      outside: does it reach beyond what cars sweep on every way it may take?
 
     Returns:
       `Verdict`.
     """
     _judge_motion(sample, memory, other, dt)
+    if outside and memory.other_broke == KEPT:
+        memory.other_broke = LEFT_PATHS
     ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
     if memory.behind:
         verdict = OTHER

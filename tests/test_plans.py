@@ -155,10 +155,10 @@ def test_braking_earlier_never_makes_a_clear_stop_unclear():
 # ---------------------------------------------------------------- blame
 
 
-def verdict_of(duel, speed):
+def verdict_of(duel, speed, outside=False):
     sample = np.zeros(1, SAMPLE)[0]
     sample["speed"] = speed
-    return VERDICTS[judge_crossing(sample, duel.memory[0], TABLE.other, DT).verdict]
+    return VERDICTS[judge_crossing(sample, duel.memory[0], outside, TABLE.other, DT).verdict]
 
 
 def contact(duel, nominal, a_other, overrides):

@@ -14,7 +14,7 @@ from envs.fast.floats import norm
 from envs.fast.network import Network, heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from envs.highway import PLANS, road_through
-from envs.intent import Junction, Roads, list_threats, no_roads, track_of
+from envs.intent import Junction, Roads, is_outside, list_threats, no_roads, track_of
 from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
 from shield.command import Command
@@ -292,7 +292,7 @@ def _scene(cars, episode, past, sight, frames, settings):
     if count > len(sight.threats):
         episode.overflow = True
     count = min(count, len(sight.threats))
-    return Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt)
+    return Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, 0.0)
 
 
 @compiled
@@ -377,9 +377,7 @@ def check_contact(cars, episode, past, lanes, sight, frames, watch, settings):
 @compiled
 def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
     plans = settings.scheme == PLANS
-    if plans:
-        _scene(cars, episode, past, sight, frames, settings)
-    else:
+    if not plans:
         _sense(cars, episode, past, lanes, sight, frames, watch, settings)
     n, last = episode.cars - 1, len(past.memory) - 1
     now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
@@ -392,7 +390,9 @@ def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
         if not (_touches(cars, k, episode.ego, sight, settings.dt) if touched else k == nearest):
             continue
         if plans:
-            verdict = judge_crossing(sight.samples[i], past.crossings[i], settings.other, settings.dt)
+            scene = _scene(cars, episode, past, sight, frames, settings)
+            outside = is_outside(scene.paths, scene.threats, i, sight.on_road[i])
+            verdict = judge_crossing(sight.samples[i], past.crossings[i], outside, settings.other, settings.dt)
         else:
             memory = past.memory[i]
             catch_up(memory, then[last], then[i], settings.ego, settings.other, settings.rules, settings.dt)
