@@ -145,6 +145,17 @@ def test_several_agents_on_a_highway_work_alike():
     assert len(env.audit()) == 2
 
 
+FREELY = {"action": {"type": "MultiAgentAction", "action_config": {"type": "ContinuousAction"}}}
+
+
+def test_agents_that_steer_themselves_keep_to_a_route_each():
+    env = make(KINDS[0], config=FREELY | {"destination": "o3"})
+    infos = play(env, 0, steps=6, action=np.array([1.0, -1.0]))
+    assert [ego.route[0][0] for ego in env._egos] == ["o0", "o1"]
+    assert all(agent["blame"] == "" and not agent["episode_broken_duties"] for agent in infos[-1]["agents"])
+    assert all(agent["shield"]["steering_change"] > 0.0 for agent in infos[2]["agents"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -153,11 +164,8 @@ def test_several_agents_on_a_highway_work_alike():
         ({"env_id": KINDS[0], "intervention_penalty": -1.0}, "intervention_penalty = -1.0"),
         ({"env_id": KINDS[0], "entry": "bold"}, "entry = 'bold'"),
         (
-            {
-                "env_id": KINDS[0],
-                "config": {"action": {"type": "MultiAgentAction", "action_config": {"type": "ContinuousAction"}}},
-            },
-            "ContinuousAction is not supported where roads cross",
+            {"env_id": KINDS[0], "config": FREELY | {"destination": "o1"}},
+            "destination = 'o1': expected a node that a car from 'o1' can drive to",
         ),
     ],
 )
