@@ -274,25 +274,31 @@ def _escape(scene, plan, go_now, brake):
 
 @compiled
 def _least_harm(scene, a, users):
-    """Of what is left to a trapped ego, what breaks the fewest duties; `a` if nothing breaks fewer [m/s^2]."""
+    """Of what is left to a trapped ego, what breaks the fewest duties; braking if that breaks no more [m/s^2]."""
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
     best, fewest = a, _duties_broken(scene, a, users)
     if fewest > 0:
-        for other in (brake, throttle(scene, scene.track.s, scene.track.v)):
-            broken = _duties_broken(scene, other, users)
-            if broken < fewest:
-                best, fewest = other, broken
+        broken = _duties_broken(scene, brake, users)
+        if broken < fewest or (broken == fewest and a > brake):
+            best, fewest = brake, broken
+        go_on = throttle(scene, scene.track.s, scene.track.v)
+        if fewest > 0 and _duties_broken(scene, go_on, users) < fewest:
+            best = go_on
     return best
 
 
 @compiled
 def _duties_broken(scene, a, users):
-    """How many road users would an acceleration leave no plan toward, though there is one now?"""
+    """How many road users would an acceleration leave no plan toward, though there is one now?
+
+    One that cannot move out of the way counts more than all that can.
+    """
     broken = 0
     for i in range(users):
         alone = _alone_with(scene, i)
         items = _plans_now(alone, i)
-        broken += items != 0 and not _is_kept(alone, i, a, items)
+        if items != 0 and not _is_kept(alone, i, a, items):
+            broken += 1 if alone.threats[0].path >= 0 else users
     return broken
 
 
