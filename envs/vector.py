@@ -7,9 +7,11 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.wrappers import RecordEpisodeStatistics
+from highway_env.envs.common.action import DiscreteMetaAction
 
-from envs.fast.config import compile_scenario
+from envs.fast.config import Unsupported, compile_scenario
 from envs.fast.vector import FastVectorEnv
+from envs.highway import PLANS
 from envs.scenarios import make
 from envs.wrapper import MODES, check_conduct, check_environment, check_params, settings_for
 from shield.params import Preset, RSSParams, Rules
@@ -73,6 +75,9 @@ def make_vec(
         check_environment(stock)
         conduct = check_conduct(entry, intent, waiting, examine)
         settings = settings_for(stock, check_params(params, stock), rules, shield, conduct)
+        if settings.scheme == PLANS and not isinstance(stock.action_type, DiscreteMetaAction):
+            kind = type(stock.action_type).__name__
+            raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
     return FastVectorEnv(scenario, num_envs, settings, intervention_penalty, autoreset_mode, threads)
 
 

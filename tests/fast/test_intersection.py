@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 from highway_env.vehicle.behavior import IDMVehicle
 from lockstep import compare
 
@@ -124,6 +125,34 @@ def test_drivers_elsewhere_keep_their_parameters():
 def test_an_unsupported_feature_is_named(env_id, config, named):
     with pytest.raises(Unsupported, match=named):
         compile_scenario(env_id, config)
+
+
+def test_free_steering_under_a_shield_is_left_to_the_original():
+    config = {"action": {"type": "ContinuousAction"}}
+    with pytest.raises(Unsupported, match="ContinuousAction with a shield where roads cross; expected backend"):
+        envs.make_vec(ENV, 1, config=config)
+    assert envs.make_vec(ENV, 1, shield=None, config=config).num_envs == 1
+
+
+@pytest.mark.parametrize(
+    ("env_id", "seed", "options", "verdict", "duty"),
+    [
+        # trapped between a wreck ahead and cars that come: it stands
+        (ENV, 1054, {"intent": "known", "config": {"duration": 30}}, "", ""),
+        ("roundabout-v0", 3071, {"intent": "known"}, "", ""),
+        # a car that has come backwards off its path sets off beside it
+        ("intersection-v2", 9898, {"intent": "any"}, "other", "left every path it could take"),
+    ],
+)
+def test_no_contact_is_the_egos_fault_or_unexplained(env_id, seed, options, verdict, duty):
+    batch = envs.make_vec(env_id, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
+    batch.reset(seed=seed)
+    faster, over = np.array([2 if env_id != "roundabout-v0" else 3]), False
+    while not over:
+        *_, terminated, truncated, infos = batch.step(faster)
+        over = bool(terminated[0] or truncated[0])
+    assert infos["blame"][0] == verdict
+    assert infos["blame_evidence"]["other_duty"][0] == duty
 
 
 def test_cars_that_come_and_go_keep_their_memory():
