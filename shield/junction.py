@@ -324,13 +324,13 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     _judge_motion(sample, memory, scene.other, scene.dt)
     scene = _alone_with(scene, i)
     follows, gap_is_safe = _is_behind(scene, i, memory.behind)
-    dangerous, kept, items, cut_in = False, True, STOP, False
+    dangerous, kept, items, cut_in, followed = False, True, STOP, False, False
     if follows:
         memory.behind |= gap_is_safe
         items = STOP if memory.behind else 0
         cut_in = not (memory.follows or clear) and memory.age > 0 and items == 0 and memory.other_broke == KEPT
     else:
-        memory.behind = False
+        followed, memory.behind = memory.behind, False
         strongest = limit(scene.ego.a_max_accel, scene.track.v, scene.ego, scene.dt)
         if stop_conflict(scene, strongest, i, False, 0.0) != NEVER:
             dangerous = True
@@ -343,6 +343,8 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
         memory.ego_excess = memory.other_excess = 0.0
     else:
         memory.since += 1
+        if followed and memory.other_broke == KEPT:  # their ways part, and it had not kept its distance
+            memory.other_broke = TOO_FAR
     if cut_in:
         dangerous, kept = True, False
         memory.ego_broke = CUT_IN
