@@ -25,7 +25,7 @@ from shield.conflict_areas import CELL, cell_of
 from shield.controller import RESPONSE_BRAKE
 from shield.junction import CAUTIOUS, PRIORITY, JunctionReport, is_follower
 from shield.kinematics import stopping_distance
-from shield.plans import THREAT, Scene, Track
+from shield.plans import Scene, Track
 
 GAP = 35.0  # whoever waits so far before the junction is in the way of no car that sets off at the junction [m]
 PATIENCE = 15.0  # an agent that has waited for that long in all is given no more gaps: it may not want any [s]
@@ -120,14 +120,8 @@ class CompliantDriver(TurnTaker):
         self.holds = self._leaves_gap(track)
         if not self.holds:
             return track, threats, roads
-        count = len(threats)
-        if count == len(self.room):
-            self.room = np.concatenate([self.room, np.zeros(count + 1, THREAT)])
-        line = self.room[count]
-        line["user"] = line["path"] = -1
-        line["from_cell"] = int(np.ceil((track.s + self.to_junction - GAP) / CELL))
-        line["to_cell"] = roads.paths.cells[track.path]
-        return track, self.room[: count + 1], roads
+        cell = int(np.ceil((track.s + self.to_junction - GAP) / CELL))
+        return track, self._closed_from(cell, track, threats, roads), roads
 
     def _leaves_gap(self, track: Track) -> bool:
         """Does it wait far back for an agent that needs a gap? Only if it can do so without hurry."""

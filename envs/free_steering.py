@@ -102,7 +102,7 @@ class FreeEgo(JunctionEgo):
     def _way(self):
         """Lanes of the network, numbers of those on the ego's path, and which of these it follows."""
         way = [self.junction.number[index] for index in self.junction.walks[self.path]]
-        return self.junction.roads.lanes, np.array(way), way.index(self.junction.number[self.route[self.passed]])
+        return self.junction.lanes, np.array(way), way.index(self.junction.number[self.route[self.passed]])
 
     def _state(self) -> np.ndarray:
         vehicle = self.vehicle

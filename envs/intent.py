@@ -102,7 +102,8 @@ class Junction:
         lanes = compile_network(network, False).lanes
         self.lead, self.following, self.beside = lead_of(network), successors_of(network), beside(network)
         self.limit = float(lanes["speed_limit"].max())
-        self._arrays = (compile_paths(network, self.limit, room), lanes, np.array(through), np.array(straight))
+        self.lanes = lanes
+        self._arrays = (compile_paths(network, self.limit, room), np.array(through), np.array(straight))
 
     def __deepcopy__(self, memo) -> "Junction":
         return self  # what is added later are answers to questions
@@ -110,11 +111,11 @@ class Junction:
     @property
     def roads(self) -> Roads:
         """Everything as arrays; rows for routes that were asked about are included."""
-        paths, lanes, through, straight = self._arrays
+        paths, through, straight = self._arrays
         choices = np.full((len(self._rows), max(map(len, self._rows))), -1)
         for row, numbers in enumerate(self._rows):
             choices[row, : len(numbers)] = numbers
-        return Roads(paths, lanes, choices, through, straight, self.limit, self.lead, self.following, self.beside)
+        return Roads(paths, self.lanes, choices, through, straight, self.limit, self.lead, self.following, self.beside)
 
     def choice(self, index, route) -> int:
         """Row of the paths of a driver who heads for lane `index` with `route` ahead; a driver without a route: any."""

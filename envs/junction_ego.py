@@ -183,13 +183,16 @@ class JunctionEgo(ShieldedEgo):
                 self._rank(road, other, threat)
         if self.may_pass or distance <= 0.0:
             return threats
+        return self._closed_from(int(np.ceil((track.s + distance) / CELL - 1e-6)), track, threats, roads)
+
+    def _closed_from(self, cell: int, track, threats, roads):
+        """The ways of others, and an obstacle on the ego's path from a cell on."""
         count = len(threats)
         if count == len(self.room):
             self.room = np.concatenate([self.room, np.zeros(count + 1, THREAT)])
-        light = self.room[count]
-        light["user"] = light["path"] = -1
-        light["from_cell"] = int(np.ceil((track.s + distance) / CELL - 1e-6))
-        light["to_cell"] = roads.paths.cells[track.path]
+        line = self.room[count]
+        line["user"] = line["path"] = -1
+        line["from_cell"], line["to_cell"] = cell, roads.paths.cells[track.path]
         return self.room[: count + 1]
 
     def _rank(self, road: SignalisedRoad, other, threat) -> None:
