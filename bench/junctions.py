@@ -139,10 +139,10 @@ def how_it_ended(env: Any, e: int) -> dict[str, Any]:
 
 def is_in_way(engine: Any, e: int) -> bool:
     """Does a wreck or a standing car overlap what the ego is going to sweep on its path?"""
-    episode, cars, frames = engine.batch.episodes[e], engine.batch.cars[e], engine.world.frames
-    ego, roads = cars[episode["ego"]], frames.roads
+    episode, cars, ways = engine.batch.episodes[e], engine.batch.cars[e], engine.world.ways
+    ego, roads = cars[episode["ego"]], ways.roads
     lane = ego["target_lane"]
-    path = roads.choices[frames.choice[ego["route"], lane], 0]
+    path = roads.choices[ways.choice[ego["route"], lane], 0]
     s = roads.paths.offset[path, lane] + local_coordinates(roads.lanes[lane], ego["x"], ego["y"])[0]
     ahead = Track(path, s + 0.5 * ego["length"], 0.0, 0.5 * ego["length"], -1, 0.0)
     for k in range(episode["cars"]):

@@ -71,6 +71,7 @@ def no_roads() -> Roads:
             none.astype(bool),
             np.zeros((0, 0)),
             np.zeros((0, 0, 6)),
+            np.zeros((0, 0, 0), np.int32),
         ),
         np.zeros(0, LANE),
         none,

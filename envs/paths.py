@@ -14,7 +14,7 @@ from envs.fast.network import compile_network, heading_at, is_after_end, local_c
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH
 from envs.fast.steering import steering_angle
 from shield.compiled import compiled_for_arrays
-from shield.conflict_areas import CELL, HALF_LENGTH, HALF_WIDTH, Paths, find_conflicts, swept_boxes
+from shield.conflict_areas import CELL, FAR, HALF_LENGTH, HALF_WIDTH, Paths, find_conflicts, swept_boxes
 
 MARGIN_LON, MARGIN_LAT = 0.25, 0.15  # of each of two cars, beyond the tracked boxes [m]
 _SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the top speed, at which a path is driven
@@ -126,7 +126,15 @@ def compile_paths(network, top_speed: float, room: float = 0.0) -> Paths:
         _crossed(lane, offset, conflicts),
         np.where(lane >= 0, lanes["speed_limit"][lane], np.inf),
         boxes,
+        _joins(lane, offset),
     )
+
+
+def _joins(lane, offset) -> np.ndarray:
+    """`Paths.joins`."""
+    shared = ~np.isnan(offset[:, lane]).swapaxes(0, 1) & (lane >= 0)[:, None]
+    cell = np.where(shared, np.arange(lane.shape[1]), FAR).astype(np.int32)
+    return np.minimum.accumulate(cell[..., ::-1], axis=-1)[..., ::-1]
 
 
 def _starts(lanes, way) -> np.ndarray:

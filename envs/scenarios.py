@@ -1,10 +1,10 @@
 """Named environments and how to make them with a shield."""
 
 import gymnasium as gym
-import highway_env  # noqa: F401  registers the environments
 
 import envs.signalised  # noqa: F401  registers another one
 from envs.multi_agent import MultiAgentShield, has_agents
+from envs.stock import make_stock
 from envs.wrapper import ShieldWrapper
 from shield.params import Preset, RSSParams, Rules
 
@@ -39,7 +39,7 @@ def make(
     if shield is None and traffic != "stock":
         raise ValueError(f"traffic = {traffic!r}: expected 'stock' without a shield; use shield = 'monitor'")
     try:
-        env = gym.make(env_id, **kwargs)
+        env = make_stock(env_id, **kwargs)
     except gym.error.Error as error:
         raise ValueError(f"env_id = {env_id!r}: {error}") from None
     if shield is None:

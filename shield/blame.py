@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shield.command import Command
-from shield.compiled import compiled, compiled_for_arrays
+from shield.compiled import compiled, compiled_for_arrays, inner
 from shield.kinematics import forward_reach, speed_envelope, travel
 from shield.lateral import approach_no_credit, lateral_euler_margin
 from shield.longitudinal import euler_margin
@@ -66,7 +66,7 @@ _NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
 
 
-@compiled
+@inner
 def _blame_ego(memory, duty, excess):
     if excess > _TOLERANCE:
         if memory.ego_broke == KEPT:
@@ -75,7 +75,7 @@ def _blame_ego(memory, duty, excess):
             memory.ego_excess = max(memory.ego_excess, excess)
 
 
-@compiled
+@inner
 def _blame_other(memory, duty, excess):
     if excess > _TOLERANCE:
         if memory.other_broke == KEPT:
@@ -141,7 +141,7 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
         _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt) - first_frame)
 
 
-@compiled
+@inner
 def _share_rear(tau, v, params, dt):
     """Farthest a follower may have got `tau` after the threshold, sampled by explicit Euler [m]."""
     rho, a, b = params.response_time, params.a_max_accel, params.a_min_brake
@@ -149,14 +149,14 @@ def _share_rear(tau, v, params, dt):
     return travel(tau, v, rho, a, b, params.v_cap) + (v - v_now) * dt / 2 + b * dt**2 / 8
 
 
-@compiled
+@inner
 def _share_front(tau, v, params, dt):
     """Least a leader must have got on `tau` after the threshold, sampled by explicit Euler [m]."""
     v_now = speed_envelope(tau, v, 0.0, 0.0, params.a_max_brake)
     return travel(tau, v, 0.0, 0.0, params.a_max_brake) + (v - v_now) * dt / 2
 
 
-@compiled
+@inner
 def _share_toward(v, params, b, dt):
     """Farthest a car with speed `v` toward the other may ever come (Def. 2 and Section 4.1's table) [m]."""
     return forward_reach(v, params.response_time, params.a_max_accel, b, params.v_cap) + euler_margin(v, b, dt)
@@ -191,7 +191,7 @@ def audit_command(memory, ego, command, drift, params, dt):
     return KEPT, 0.0
 
 
-@compiled
+@inner
 def _audit_acceleration(role, tau, v, a, params, dt):
     """Def. 4 on one frame that starts `tau` after the threshold at speed `v`: (duty, excess), 0 = kept."""
     lower, upper = longitudinal_response(role, tau, v, params)

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 from numba import njit, types
+from numba.core.registry import CPUDispatcher
 from numba.extending import overload
 
 _njit: Any = njit  # its published types lack some options
+UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def fingerprint(*more: Path) -> str:
@@ -19,6 +21,33 @@ def fingerprint(*more: Path) -> str:
     for source in sorted({*Path(__file__).parent.glob("*.py"), *more}):
         digest.update(source.name.encode() + source.read_bytes())
     return digest.hexdigest()
+
+
+class Inner(CPUDispatcher):
+    """A function that exists inside other compiled functions only.
+
+    What calls from Python would need (to unpack each field of each argument) makes up a good part of the
+    machine code, and of the time it takes to compile.
+    """
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        raise TypeError(f"{self.py_func.__name__} can only be called from compiled code")
+
+
+def inner(function: Callable[..., Any], **options: Any) -> Any:
+    """`compiled` for what is called from compiled functions only; it becomes a part of each."""
+    return only_inside(_njit(error_model="numpy", _nrt=False, **UNWRAPPED, **options)(function))
+
+
+def only_inside(dispatcher: Any) -> Any:
+    """Keep Python from calling a function that was compiled `UNWRAPPED`; it would crash."""
+    dispatcher.__class__ = Inner
+    return dispatcher
+
+
+def inner_merged(function: Callable[..., Any]) -> Any:
+    """`inner`, and merged into its callers: handing over tables by value would cost more than the work."""
+    return inner(function, forceinline=True)
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -31,17 +60,19 @@ def compiled(function: Callable[..., Any]) -> Any:
     elsewhere it would go on with the old code. A shield must never do that, so any change in the
     package, or in that of the function, compiles everything anew.
     """
-    return _stamped(_njit(cache=True, error_model="numpy", _nrt=False)(function))
+    return _stamped(_njit(cache=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)(function))
 
 
 def merged(function: Callable[..., Any]) -> Any:
-    """`compiled`, and merged into its callers: handing over tables by value would cost more than the work."""
-    return _stamped(_njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)(function))
+    """`compiled`, and merged into compiled callers."""
+    return _stamped(
+        _njit(cache=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True, forceinline=True)(function)
+    )
 
 
 def compiled_for_arrays(function: Callable[..., Any]) -> Any:
     """`compiled` for what also takes whole arrays, or makes them."""
-    return _stamped(_njit(cache=True, error_model="numpy")(function))
+    return _stamped(_njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function))
 
 
 def _stamped(dispatcher: Any) -> Any:

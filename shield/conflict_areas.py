@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, compiled_for_arrays
+from shield.compiled import compiled, compiled_for_arrays, inner
 
 CELL = 0.5  # length of a cell [m]
 X, Y, COS, SIN, HALF_LENGTH, HALF_WIDTH = range(6)  # columns of a box
+FAR = 1 << 30
 _NOTHING = np.inf
 
 
@@ -30,6 +31,7 @@ class Paths(NamedTuple):
     crossed: np.ndarray  # `[P, C]` a car standing there is in the way of a path that it is not on
     speed_limit: np.ndarray  # `[P, C]` [m/s], inf = none
     swept: np.ndarray  # `[P, C, 6]` what others sweep in each cell
+    joins: np.ndarray  # `[P, P, C]` int32: next cell of the first path on a lane of the second; `FAR` = none
 
 
 @compiled
@@ -121,7 +123,7 @@ def find_conflicts(boxes, others, cells, conflicts, first):
                 first[a, b, i] = nearest
 
 
-@compiled
+@inner
 def _conflicts_of_cell(box, others, count, interval):
     reach = np.hypot(box[HALF_LENGTH], box[HALF_WIDTH])
     k, inside = 0, False

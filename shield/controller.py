@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shield.command import Command
-from shield.compiled import compiled, merged
+from shield.compiled import compiled, inner, inner_merged
 from shield.geometry import signed_gap
 from shield.pair import assess, leading_speed, least_margin, own_share, toward
 from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, remember
@@ -106,7 +106,7 @@ def shield_frame(ego, users, ego_before, users_before, memory, nominal, body, eg
     )
 
 
-@merged
+@inner_merged
 def _may_be_next(ego, user, ttc, rules):
     """May this user, driving the same way, be ahead in the way of the ego and nearer in time than `ttc` [s]?"""
     if user.s < ego.s or signed_gap(user.y - ego.y, ego.half_width, user.half_width) >= 0.0:
@@ -135,7 +135,7 @@ def restrict(nominal, bounds, ego, body, rules, dt):
     return Command(a, _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt))
 
 
-@compiled
+@inner
 def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     """Slip angle nearest to the nominal one inside the lateral bounds [rad].
 
@@ -174,7 +174,7 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     return min(max(slip, low), high)
 
 
-@merged
+@inner_merged
 def _is_permitted(course, psi_next, v, v_next, drift, bounds, rules):
     """Do course and next heading [rad] keep all bounds? The bounds in closed form, without solving for the slip."""
     if abs(course) >= _STEEP or abs(psi_next) >= _STEEP:
@@ -189,7 +189,7 @@ def _is_permitted(course, psi_next, v, v_next, drift, bounds, rules):
     )
 
 
-@compiled
+@inner
 def _straightening_slip(psi, turned, drift, gain, v, bounds):
     """Slip that ends the sideways motion [rad].
 
@@ -206,6 +206,6 @@ def _straightening_slip(psi, turned, drift, gain, v, bounds):
     return slip
 
 
-@compiled
+@inner
 def _arcsin(x):
     return np.arcsin(min(max(x, -1.0), 1.0))

@@ -15,7 +15,7 @@ that they do not meet. The judge looks at everybody.
 
 import numpy as np
 
-from shield.compiled import compiled, merged
+from shield.compiled import compiled, inner, inner_merged
 from shield.conflict_areas import CELL, X, Y, cell_of
 
 ALL, TABLE, GEOFENCE, WALK, FIRST_CONFLICTING, FIRST = range(6)
@@ -61,7 +61,7 @@ def examine(scene, samples, which, slack):
         _thin_out(paths, track, threats)
 
 
-@compiled
+@inner
 def _thin_out(paths, track, threats):
     """Leave out whoever is on the approach of one at whom the filter stops, and behind it."""
     for k in range(len(threats)):
@@ -76,7 +76,7 @@ def _thin_out(paths, track, threats):
                 threat.left_out = True
 
 
-@merged
+@inner_merged
 def _meets_path(paths, track, threat, slack):
     """Is any of the ego's path ahead, or of the lane that it is leaving, in the way of a road user's?"""
     here = cell_of(track.s - slack, paths.cells[track.path])
@@ -87,14 +87,14 @@ def _meets_path(paths, track, threat, slack):
     return meets
 
 
-@merged
+@inner_merged
 def _is_on_way(paths, track, threat):
     """Is a road user on a lane of the ego's path?"""
     lane = paths.lane[threat.path, cell_of(threat.s, paths.cells[threat.path])]
     return not np.isnan(paths.offset[track.path, lane])
 
 
-@compiled
+@inner
 def _to_meeting(paths, track, threat):
     """How far the ego and a road user are from where they first meet [m]; inf if one has passed it already."""
     for i in range(cell_of(track.s, paths.cells[track.path]), paths.cells[track.path]):
@@ -107,7 +107,7 @@ def _to_meeting(paths, track, threat):
     return np.inf, np.inf
 
 
-@merged
+@inner_merged
 def _arrival(distance, speed):
     """Time to a place ahead at unchanged motion [s]."""
     if distance <= 0.0:
@@ -115,7 +115,7 @@ def _arrival(distance, speed):
     return distance / speed if speed > 0.0 else np.inf
 
 
-@compiled
+@inner
 def _is_before_exit(paths, threat):
     """Is a road user before the junction, or in it?"""
     for i in range(cell_of(threat.s, paths.cells[threat.path]), paths.cells[threat.path]):
@@ -124,7 +124,7 @@ def _is_before_exit(paths, threat):
     return False
 
 
-@compiled
+@inner
 def _centre(paths, track):
     """Middle between the ends of the stretch of the ego's path on which it is in the way of others."""
     first, last = -1, -1

@@ -7,7 +7,7 @@ cosine and sine of the start heading. y points to the right of the driving direc
 
 import numpy as np
 
-from shield.compiled import compiled, merged
+from shield.compiled import compiled, inner, inner_merged, merged
 
 PIECE_FIELDS = 8
 X, Y, HEADING, CURVATURE, LENGTH, ARC_START, COS, SIN = range(PIECE_FIELDS)
@@ -26,7 +26,7 @@ def wrap_angle(angle):
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-@merged
+@inner_merged
 def _on_piece(piece, x, y):
     """Arc length from the start of a piece, signed lateral offset [m] and heading of the lane there [rad]."""
     dx, dy = x - piece[X], y - piece[Y]
@@ -85,7 +85,7 @@ def nearest_piece(road, x, y):
     return s_best, y_best, k_best, heading_best
 
 
-@compiled
+@inner
 def _on_tangent(piece, x, y, at_end):
     """Coordinates on the straight continuation of a curved piece."""
     length = piece[LENGTH] if at_end else 0.0

@@ -29,13 +29,16 @@ from shield.blame import (
     WAVERED,
     Verdict,
 )
-from shield.compiled import compiled, merged
+from shield.compiled import compiled, inner, inner_merged, merged
 from shield.conflict_areas import CELL, boxes_overlap, cell_of
 from shield.controller import RESPONSE_BRAKE, RESPONSE_GO
 from shield.examined import TABLE, count_examined, examine, is_left_out
 from shield.plans import (
+    ANYWHERE,
+    EVERYBODY,
     GO,
     NEVER,
+    NOW,
     SLACK,
     STOP,
     Scene,
@@ -44,6 +47,7 @@ from shield.plans import (
     can_give_way,
     distance_behind,
     go_plan,
+    look_ahead,
     on_path_of_ego,
     plan_conflict,
     stop_conflict,
@@ -177,9 +181,11 @@ def has_plan(scene, memory, entry, at_line):
             return False
     sort_out(scene, memory, entry)
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
-    if stop_conflict(scene, brake, -1, at_line, SLACK + scene.drift) == NEVER:
+    if stop_conflict(scene, brake, EVERYBODY, at_line, SLACK + scene.drift) == NEVER:
         return True
-    return go_plan(scene, throttle(scene, scene.track.s, scene.track.v), -1, at_line, SLACK + scene.drift)[0] >= 0
+    return (
+        go_plan(scene, throttle(scene, scene.track.s, scene.track.v), EVERYBODY, at_line, SLACK + scene.drift)[0] >= 0
+    )
 
 
 @merged
@@ -195,6 +201,7 @@ def sort_out(scene, memory, entry):
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         threat.ignored = threat.left_out = False
+        look_ahead(scene, threat)
         if threat.path < 0:
             continue
         if is_follower(scene, threat, memory[threat.user].behind):
@@ -221,7 +228,7 @@ def is_follower(scene, threat, established):
     return from_ego >= 0 and from_ego == from_other and track.s - entered_ego - (threat.s - entered_other) > bodies
 
 
-@merged
+@inner_merged
 def _entered(paths, path, s):
     """Where on a path a driver at `s` headed for its lane [m], and the lane before, -1 = none."""
     i = cell_of(s, paths.cells[path])
@@ -231,48 +238,48 @@ def _entered(paths, path, s):
     return (i + 1) * CELL, paths.lane[path, i] if i >= 0 else -1
 
 
-@compiled
+@inner
 def _choose(scene, plan, a, at_line, holds):
     """Acceleration of this frame, whether a plan remains, and whether none is left to the ego."""
     if not holds:
-        if stop_conflict(scene, a, -1, at_line, SLACK + scene.drift) == NEVER:
+        if stop_conflict(scene, a, EVERYBODY, at_line, SLACK + scene.drift) == NEVER:
             plan.go = 0
             return a, True, False
-        go, _ = go_plan(scene, a, -1, at_line, SLACK + scene.drift)
+        go, _ = go_plan(scene, a, EVERYBODY, at_line, SLACK + scene.drift)
         if go >= 0:
             plan.go = go
             return a, True, False
     go_now = throttle(scene, scene.track.s, scene.track.v)
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
-    if plan.go >= 0 and plan_conflict(scene, plan.go, -1, 0.0) == NEVER:
+    if plan.go >= 0 and plan_conflict(scene, plan.go, EVERYBODY, 0.0) == NEVER:
         goes = plan.go > 0
         plan.go = max(plan.go - 1, 0)
         return (go_now if goes else brake), True, False
     return _escape(scene, plan, go_now, brake)
 
 
-@compiled
+@inner
 def _escape(scene, plan, go_now, brake):
     """Somebody left their bounds, or appeared: a plan that stays clear of everybody, or for longest."""
-    stop_at = stop_conflict(scene, brake, -1, False, 0.0)
+    stop_at = stop_conflict(scene, brake, EVERYBODY, ANYWHERE, 0.0)
     if stop_at == NEVER:
         plan.go = 0
         return brake, True, False
-    go, go_at = go_plan(scene, go_now, -1, False, 0.0)
+    go, go_at = go_plan(scene, go_now, EVERYBODY, ANYWHERE, 0.0)
     if go >= 0:
         plan.go = go
         return go_now, True, False
     plan.go = -1
     begin(scene)
     track, ego = scene.track, scene.ego
-    hard_at = tail_conflict(scene, track.s, track.v, 0, ego.a_max_brake, -1, False, 0.0)
+    hard_at = tail_conflict(scene, track.s, track.v, NOW, ego.a_max_brake, EVERYBODY, ANYWHERE, 0.0)
     # to stop comes first, unless somebody is about to arrive (junction hole H7)
     if max(stop_at, hard_at) * scene.dt < _IMMINENT and go_at > max(stop_at, hard_at):
         return go_now, False, True
     return (limit(-ego.a_max_brake, track.v, ego, scene.dt) if hard_at > stop_at else brake), False, True
 
 
-@compiled
+@inner
 def _least_harm(scene, a, users):
     """Of what is left to a trapped ego, what breaks the fewest duties; braking if that breaks no more [m/s^2]."""
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
@@ -287,7 +294,7 @@ def _least_harm(scene, a, users):
     return best
 
 
-@compiled
+@inner
 def _duties_broken(scene, a, users):
     """How many road users would an acceleration leave no plan toward, though there is one now?
 
@@ -332,7 +339,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     else:
         followed, memory.behind = memory.behind, False
         strongest = limit(scene.ego.a_max_accel, scene.track.v, scene.ego, scene.dt)
-        if stop_conflict(scene, strongest, i, False, 0.0) != NEVER:
+        if stop_conflict(scene, strongest, i, ANYWHERE, 0.0) != NEVER:
             dangerous = True
             if not clear:
                 items = _plans_now(scene, i)
@@ -362,7 +369,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     return dangerous, kept
 
 
-@merged
+@inner_merged
 def _alone_with(scene, i):
     """The scene without the ways of others before and after those of a road user, which stand together."""
     first, last = len(scene.threats), 0
@@ -372,7 +379,7 @@ def _alone_with(scene, i):
     return Scene(scene.paths, scene.track, scene.threats[first:last], scene.ego, scene.other, scene.dt, scene.drift)
 
 
-@merged
+@inner_merged
 def _judge_motion(sample, memory, other, dt):
     """Did a road user leave the bounds that plans assume, since the last sample?"""
     if memory.age == 0:
@@ -397,7 +404,7 @@ def _judge_motion(sample, memory, other, dt):
         memory.other_broke, memory.other_excess = duty, excess
 
 
-@merged
+@inner_merged
 def _is_behind(scene, i, established):
     """Does a road user follow the ego, whatever way it takes, and at a safe distance (Lemma 2)?"""
     behind, safe, other = False, True, scene.other
@@ -415,23 +422,23 @@ def _is_behind(scene, i, established):
     return behind, safe
 
 
-@compiled
+@inner
 def _plans_now(scene, i):
     """Kinds of plans that stay clear of one road user from this sample on."""
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
-    if stop_conflict(scene, brake, i, False, 0.0) == NEVER:
+    if stop_conflict(scene, brake, i, ANYWHERE, 0.0) == NEVER:
         return STOP
-    return GO if go_plan(scene, throttle(scene, scene.track.s, scene.track.v), i, False, 0.0)[0] >= 0 else 0
+    return GO if go_plan(scene, throttle(scene, scene.track.s, scene.track.v), i, ANYWHERE, 0.0)[0] >= 0 else 0
 
 
-@compiled
+@inner
 def _is_kept(scene, i, a, items):
     """Does the ego's acceleration leave it a plan? Where there is none, does it brake or go on with all it has?"""
     if items == 0:
         stops = scene.track.v + a * scene.dt <= _TOLERANCE
         goes = a >= throttle(scene, scene.track.s, scene.track.v) - _TOLERANCE
         return stops or goes or a <= -scene.ego.a_min_brake + _TOLERANCE
-    return stop_conflict(scene, a, i, False, 0.0) == NEVER or go_plan(scene, a, i, False, 0.0)[0] >= 0
+    return stop_conflict(scene, a, i, ANYWHERE, 0.0) == NEVER or go_plan(scene, a, i, ANYWHERE, 0.0)[0] >= 0
 
 
 @compiled
@@ -471,7 +478,7 @@ def judge_crossing(sample, memory, outside, other, dt):
     )
 
 
-@merged
+@inner_merged
 def _ttc(scene):
     """Time to collision with a slower road user ahead on the ego's lane [s]; inf if there is none."""
     ttc, track = np.inf, scene.track

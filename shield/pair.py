@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, merged
+from shield.compiled import compiled, inner, inner_merged, merged
 from shield.geometry import signed_gap
 from shield.kinematics import reach, stopping_distance
 from shield.lateral import approach_no_credit, d_min_no_credit, d_min_of_pair, lateral_euler_margin
@@ -140,7 +140,7 @@ def least_margin(ego, user, share_ego, ego_params, other_params, rules, dt):
     return signed_gap(user.s - ego.s, ego.half_length, user.half_length) - (max(way, 0.0) + margins)
 
 
-@merged
+@inner_merged
 def _credit(v_front, rear, front):
     """The leader's own way to rest [m]; 0 if the cars may be closest before they stand."""
     return stopping_distance(v_front, front.a_max_brake) if rear.a_min_brake <= front.a_max_brake else 0.0
@@ -170,7 +170,7 @@ def sampling_margin(w, car, dt):
     return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8
 
 
-@merged
+@inner_merged
 def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt):
     """Speeds along the lane as Def. 1 or 2 must assume them, and the required gap."""
     # A follower may turn back into the lane at any time: its whole speed counts.
@@ -198,13 +198,13 @@ def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, ru
     return v_ego, v_other, d
 
 
-@compiled
+@inner
 def _fastest(user):
     """Speed along the lane that a follower must be expected to have [m/s]: one turned round may reverse forward."""
     return max(user.speed, user.speed * user.cos)
 
 
-@compiled
+@inner
 def _settled(v):
     """A speed without the rounding error that a car which has just stopped is left with [m/s]."""
     return 0.0 if abs(v) < _STANDSTILL else v

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, merged
+from shield.compiled import compiled, inner, inner_merged, merged
 from shield.conflict_areas import CELL, Paths, cell_of, in_conflict
 from shield.kinematics import response_distance, stopping_distance, travel
 from shield.longitudinal import d_min_following
@@ -28,6 +28,12 @@ STOP, GO = 1, 2  # kinds of plans
 KNOWN, STRAIGHT, ANY = range(3)  # what is known of the ways that others take: see `INTENTS`
 INTENTS = ("known", "straight", "any")
 NEVER = 1 << 30  # frame of something that does not happen
+
+# Arguments as numpy numbers: for each number of Python's that it is handed, numba compiles a function anew.
+EVERYBODY = np.int64(-1)  # whom a plan stays clear of
+ANYWHERE = np.bool_(False)  # it may come to rest wherever nobody meets it, not only `at_line`
+NOW, NEXT = np.int64(0), np.int64(1)  # frames of a plan
+
 SLACK = 0.2  # a new plan stays clear even if the ego is this far off; one in force only has to stay clear [m]
 _SHORT_CUT = 1.0  # a car that cuts the corners of its path gains or loses at most this ...
 _SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
@@ -55,7 +61,8 @@ THREAT = np.dtype(
         ("left_out", "?"),  # the ego's plans are not checked against it: see `shield.examined`
         ("stops_here", "?"),  # who is behind it on its approach is not looked at
         ("left", "i8"),  # frame of the plan from which on it is a follower
-        ("tail", "i8"),  # likewise while a plan brakes
+        ("free_until", "i8"),  # frame of a plan before which it cannot reach the ego's path ahead
+        ("joins", "i8"),  # cell of the ego's path from which on it may be on the ego's lane
         ("from_cell", "i8"),  # cells of the ego's path in the way of an obstacle
         ("to_cell", "i8"),
     ],
@@ -89,7 +96,7 @@ class Scene(NamedTuple):
 # ---------------------------------------------------------------- where others may be
 
 
-@merged
+@inner_merged
 def nearest(threat, t, other):
     """Least arc length at which a road user can be `t` from now [m]."""
     if threat.wreck:
@@ -111,7 +118,7 @@ def farthest(threat, t, other):
     return threat.s + driven + _short_cut(driven)
 
 
-@merged
+@inner_merged
 def _beyond_line(t, other):
     """How far behind a stop line a car can be `t` after it may go, if until then it was able to stop there [m].
 
@@ -120,13 +127,13 @@ def _beyond_line(t, other):
     return 0.5 * (other.a_max_accel + other.a_min_brake) * t**2
 
 
-@merged
+@inner_merged
 def _short_cut(driven):
     """How far progress along a path may differ from the distance driven [m]."""
     return min(_SHORT_CUT_SHARE * driven, _SHORT_CUT)
 
 
-@merged
+@inner_merged
 def fastest(threat, t, other):
     """Largest speed it can have `t` from now [m/s]."""
     return max(threat.v, min(threat.v + other.a_max_accel * t, threat.cap), 0.0)
@@ -135,18 +142,24 @@ def fastest(threat, t, other):
 # ---------------------------------------------------------------- the ego and one of them
 
 
-@merged
+@inner_merged
 def follows(scene, s, v, threat, t):
     """Would a road user be behind the ego, at `s` with speed `v`, on its lane by then, at a safe distance (Lemma 2)?"""
-    if threat.path < 0 or threat.wreck:
-        return False
     track, other = scene.track, scene.other
+    if threat.path < 0 or threat.wreck or not _shares_lane(scene.paths, track.path, s, threat):
+        return False
     s_other = on_path_of_ego(scene.paths, track.path, s, threat, farthest(threat, t, other))
     gap = s - track.half_length - threat.half_length - s_other
     return gap > 0.0 and gap >= distance_behind(threat, fastest(threat, t, other), v, other)
 
 
-@merged
+@inner_merged
+def _shares_lane(paths, path, s, threat):
+    """Does the way of a road user run along the lane that the ego is on at `s`?"""
+    return not np.isnan(paths.offset[threat.path, paths.lane[path, cell_of(s, paths.cells[path])]])
+
+
+@inner_merged
 def distance_behind(threat, v_threat, v, other):
     """Distance that a follower has to keep (Lemma 2) [m]; beyond the speed limit it does not accelerate."""
     rear = RSSParams(
@@ -164,7 +177,7 @@ def distance_behind(threat, v_threat, v, other):
     return d_min_following(v_threat, v, rear, other)
 
 
-@merged
+@inner_merged
 def on_path_of_ego(paths, path, s, threat, s_threat):
     """Arc length of a road user as the ego counts it, inf where it does not drive along the ego's lane [m]."""
     lane = paths.lane[path, cell_of(s, paths.cells[path])]
@@ -175,13 +188,13 @@ def on_path_of_ego(paths, path, s, threat, s_threat):
     return s_other if s_other >= s or _comes_from_behind(paths, path, s, threat, s_threat, s - s_other) else np.inf
 
 
-@merged
+@inner_merged
 def _comes_from_behind(paths, path, s, threat, s_threat, distance):
     """Does a road user at `distance` [m] behind the ego not come in its way before? On a ring everybody is behind."""
     return paths.first[path, threat.path, cell_of(s, paths.cells[path])] - s_threat >= distance - _BODIES
 
 
-@merged
+@inner_merged
 def behind_by(paths, track, threat):
     """How far a road user on the ego's own way is behind it; -inf if it is not on it [m]."""
     lane = paths.lane[threat.path, cell_of(threat.s, paths.cells[threat.path])]
@@ -193,7 +206,7 @@ def behind_by(paths, track, threat):
     return distance if distance <= 0.0 or clear else -np.inf
 
 
-@merged
+@inner_merged
 def meets(scene, s, slack, threat, t, resting):
     """Can a road user be in the way of the ego at `s`, at time `t` from now or, if it rests, ever after?
 
@@ -223,10 +236,35 @@ def can_give_way(scene, threat):
     return can_stop_before(entry - CELL - threat.s, max(threat.v, 0.0), scene.other)
 
 
+@inner
+def look_ahead(scene, threat):
+    """Note until when a road user is neither in the way of the ego nor behind it, wherever a plan may take the ego.
+
+    Most are far away: this spares looking at them on the frames of each plan, and changes nothing else.
+    """
+    threat.free_until, threat.joins = 0, 0
+    paths, track = scene.paths, scene.track
+    if threat.path < 0 or track.beside >= 0:
+        return
+    here = cell_of(track.s - SLACK - scene.drift, paths.cells[track.path])
+    entry = paths.first[track.path, threat.path, here]
+    low, high = 0, int(_LONGEST / scene.dt)  # the frame sought is among them, or later
+    if entry == np.inf:
+        low = high
+    while low < high:
+        middle = (low + high) // 2
+        if farthest(threat, middle * scene.dt, scene.other) < entry:
+            low = middle + 1
+        else:
+            high = middle
+    threat.free_until = low
+    threat.joins = paths.joins[track.path, threat.path, cell_of(track.s, paths.cells[track.path])]
+
+
 # ---------------------------------------------------------------- plans
 
 
-@merged
+@inner_merged
 def step(s, v, a, dt):
     """One frame of explicit Euler, never backwards."""
     return s + v * dt, max(v + a * dt, 0.0)
@@ -240,34 +278,43 @@ def throttle(scene, s, v):
     return min(ego.a_max_accel, max((cap - v) / scene.dt, 0.0))
 
 
-@compiled
-def _meets_anyone(scene, s, v, n, only, slack, resting, braking):
-    """Does the ego, at `s` with speed `v` on frame n of a plan, meet anyone (or road user `only`, if not -1)?
+@inner_merged
+def _counts(threat, n, only):
+    """Must a plan stay clear of a road user from frame n on, `only` being the one that counts, -1 = all?"""
+    if threat.ignored or threat.left <= n:
+        return False
+    return threat.user == only if only >= 0 else not threat.left_out
 
-    Whoever is a follower by then counts no more: for the rest of the plan, or of its tail if `braking`.
+
+@inner_merged
+def _is_away(scene, s, n, threat):
+    """Is a road user too far away on frame n to be in the way of the ego at `s` or behind it (see `look_ahead`)?"""
+    return n < threat.free_until and cell_of(s, scene.paths.cells[scene.track.path]) < threat.joins
+
+
+@inner
+def _meets_anyone(scene, s, v, n, only, slack):
+    """Does the ego, at `s` with speed `v` on frame n of a plan's throttle phase, meet anyone?
+
+    Whoever is a follower by then counts no more for the rest of the plan.
     """
     t = n * scene.dt
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
-        if threat.ignored or threat.left <= n or (threat.left_out if only < 0 else threat.user != only):
-            continue
-        if braking and threat.tail <= n:
+        if not _counts(threat, n, only) or _is_away(scene, s, n, threat):
             continue
         if follows(scene, s, v, threat, t):
-            if braking:
-                threat.tail = n
-            else:
-                threat.left = n
-        elif meets(scene, s, slack, threat, t, resting):
+            threat.left = n
+        elif meets(scene, s, slack, threat, t, False):
             return True
     return False
 
 
-@merged
+@inner_merged
 def begin(scene):
     """Nobody has become a follower yet."""
     for k in range(len(scene.threats)):
-        scene.threats[k].left = scene.threats[k].tail = NEVER
+        scene.threats[k].left = NEVER
 
 
 @compiled
@@ -282,20 +329,45 @@ def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
       at_line: the ego may rest only where it is in nobody's way, whoever may come.
       slack: how exactly the ego is known to follow the plan [m].
     """
-    paths, path = scene.paths, scene.track.path
-    rest = s + v * scene.dt + stopping_distance(v, brake) + scene.drift
+    paths, path, dt = scene.paths, scene.track.path, scene.dt
+    rest = s + v * dt + stopping_distance(v, brake) + scene.drift
     if at_line and paths.crossed[path, cell_of(rest, paths.cells[path])]:
         return n
+    s_rest, v_rest, n_rest = s, v, n
+    while v_rest > _REST:
+        s_rest, v_rest = step(s_rest, v_rest, -brake, dt)
+        n_rest += 1
+    conflict = NEVER
     for k in range(len(scene.threats)):
-        scene.threats[k].tail = NEVER
-    while True:
-        resting = v <= _REST
-        if _meets_anyone(scene, s, v, n, only, slack, resting, True):
-            return n
+        threat = scene.threats[k]
+        if not _counts(threat, n, only):
+            continue
+        if n_rest > 0 and _is_away(scene, s_rest, n_rest - 1, threat):
+            if n_rest < conflict and meets(scene, s_rest, slack, threat, n_rest * dt, True):
+                conflict = n_rest
+        else:
+            conflict = min(conflict, _meets_braking(scene, s, v, n, brake, conflict, slack, threat))
+    return conflict
+
+
+@inner_merged
+def _meets_braking(scene, s, v, n, brake, until, slack, threat):
+    """First frame from n on, before `until`, on which the braking ego meets a road user; `NEVER` if none.
+
+    Once it is a follower, it is none that the ego meets.
+    """
+    while n < until:
+        t, resting = n * scene.dt, v <= _REST
+        if resting or not _is_away(scene, s, n, threat):
+            if follows(scene, s, v, threat, t):
+                return NEVER
+            if meets(scene, s, slack, threat, t, resting):
+                return n
         if resting:
             return NEVER
         s, v = step(s, v, -brake, scene.dt)
         n += 1
+    return NEVER
 
 
 @compiled
@@ -303,7 +375,7 @@ def stop_conflict(scene, a, only, at_line, slack):
     """First frame on which "this frame `a`, then brake" meets somebody, `NEVER` if none."""
     begin(scene)
     s, v = step(scene.track.s, scene.track.v, a, scene.dt)
-    return tail_conflict(scene, s, v, 1, scene.ego.a_min_brake, only, at_line, slack)
+    return tail_conflict(scene, s, v, NEXT, scene.ego.a_min_brake, only, at_line, slack)
 
 
 @compiled
@@ -316,9 +388,9 @@ def go_plan(scene, a, only, at_line, slack):
     """
     begin(scene)
     s, v = step(scene.track.s, scene.track.v, a, scene.dt)
-    n, latest = 1, 0
+    n, latest = NEXT, NOW
     while n * scene.dt < _LONGEST:
-        if _meets_anyone(scene, s, v, n, only, slack, False, False):
+        if _meets_anyone(scene, s, v, n, only, slack):
             return -1, max(latest, n)
         if n % _TAIL == 2:
             conflict = tail_conflict(scene, s, v, n, scene.ego.a_min_brake, only, at_line, slack)
@@ -336,7 +408,7 @@ def plan_conflict(scene, go, only, slack):
     begin(scene)
     s, v = scene.track.s, scene.track.v
     for n in range(go):
-        if n > 0 and _meets_anyone(scene, s, v, n, only, slack, False, False):
+        if n > 0 and _meets_anyone(scene, s, v, n, only, slack):
             return n
         s, v = step(s, v, throttle(scene, s, v), scene.dt)
-    return tail_conflict(scene, s, v, go, scene.ego.a_min_brake, only, False, slack)
+    return tail_conflict(scene, s, v, go, scene.ego.a_min_brake, only, ANYWHERE, slack)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled
+from shield.compiled import compiled, inner
 from shield.kinematics import reach
 from shield.params import RSSParams
 
@@ -119,7 +119,7 @@ def time_to_green(plan, group, time):
     return 0.0 if signal_at(plan, group, time) == GREEN else _time_to(plan, group, time, GREEN)
 
 
-@compiled
+@inner
 def _time_to(plan, group, time, signal):
     """Until a part of the cycle begins in which a group sees a signal [s]; inf if there is none."""
     start, now = 0.0, time % cycle_time(plan)

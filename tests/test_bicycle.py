@@ -6,6 +6,7 @@ from highway_env.road.lane import CircularLane
 from highway_env.road.road import RoadNetwork
 from highway_env.vehicle.dynamics import BicycleVehicle
 from highway_env.vehicle.kinematics import Vehicle
+from numba import njit
 
 from envs.bicycle import HEADING, SPEED, lane_keeping, move
 from envs.fast.network import compile_network, local_coordinates
@@ -64,6 +65,7 @@ def own(lane, state, acceleration):
     return lane_keeping(lane, state, acceleration, True, DT)
 
 
+@njit
 def of_drivers(lane, state, acceleration):
     s, lateral = local_coordinates(lane, state[0], state[1])
     return steering_angle(lane, s, lateral, state[HEADING], state[SPEED], CAR_LENGTH)

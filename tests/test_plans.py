@@ -5,8 +5,9 @@ import pytest
 from junction_world import DT, EGO, TABLE, Duel, arms, crossing_pairs, junction
 
 from shield.blame import VERDICTS
-from shield.junction import ASSERTIVE, CAUTIOUS, PRIORITY, SAMPLE, judge_crossing
-from shield.plans import NEVER, Scene, Track, plan_conflict, stop_conflict
+from shield.conflict_areas import CELL, FAR
+from shield.junction import ASSERTIVE, CAUTIOUS, CROSSING, PRIORITY, SAMPLE, judge_crossing, sort_out
+from shield.plans import NEVER, SLACK, THREAT, Scene, Track, go_plan, plan_conflict, stop_conflict
 
 STARTS = [(s, v) for s in (70.0, 88.0, 97.0) for v in (0.0, 9.0)]
 OTHERS = [(s, v) for s in (55.0, 80.0, 95.0) for v in (3.0, 9.0)]
@@ -215,3 +216,50 @@ def test_danger_that_was_there_at_first_sight_is_inherited():
     duel = Duel(a, b, i * 0.5 - 2.0, 9.0, float(paths.conflicts[a, b, i, 0]) - 2.0, 9.0)
     assert contact(duel, 0.0, 0.0, overrides=True)
     assert verdict_of(duel, float(duel.threats["v"][0])) == "inherited"
+
+
+def crowd(env_id, rng):
+    """The ego and ten others anywhere on the paths of a network, sorted out."""
+    roads = junction(env_id).roads
+    paths = roads.paths
+    path = int(rng.integers(len(paths.cells)))
+    ego = Track(path, rng.uniform(0.0, paths.cells[path] * CELL), rng.uniform(0.0, 12.0), 2.5, -1, 0.0)
+    threats = np.zeros(10, THREAT)
+    threats["user"], threats["path"] = np.arange(10), rng.integers(len(paths.cells), size=10)
+    threats["s"], threats["v"] = rng.uniform(0.0, 0.5 * paths.cells[threats["path"]]), rng.uniform(-1.0, 12.0, 10)
+    threats["cap"], threats["half_length"], threats["wreck"] = roads.limit, 2.5, rng.random(10) < 0.1
+    scene = Scene(paths, ego, threats, EGO, TABLE.other, DT)
+    sort_out(scene, np.zeros(10, CROSSING), CAUTIOUS)
+    return scene
+
+
+def conflicts(scene, a, only, slack):
+    return stop_conflict(scene, a, only, False, slack), go_plan(scene, a, only, False, slack)
+
+
+@pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0"])
+def test_looking_ahead_saves_work_and_changes_nothing(env_id):
+    rng = np.random.default_rng(0)
+    far = changed_by_haste = 0
+    for _ in range(400):
+        scene = crowd(env_id, rng)
+        a, only, slack = rng.choice([-6.0, -2.0, 0.0, 3.0]), int(rng.choice([-1, 3])), rng.choice([0.0, SLACK])
+        foreseen = conflicts(scene, a, only, slack)
+        free_until, joins = scene.threats["free_until"].copy(), scene.threats["joins"].copy()
+        far += np.sum((free_until > 10) & (joins > 2 * scene.track.s + 10))
+        scene.threats["free_until"] = 0
+        assert conflicts(scene, a, only, slack) == foreseen
+        scene.threats["free_until"] = free_until + 15  # a second too optimistic
+        changed_by_haste += conflicts(scene, a, only, slack) != foreseen
+    assert far > 200
+    assert changed_by_haste > 0
+
+
+@pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0"])
+def test_where_the_lanes_of_two_paths_join_is_found_in_advance(env_id):
+    paths = junction(env_id).roads.paths
+    for a in range(len(paths.cells)):
+        for b in range(len(paths.cells)):
+            shared = [i for i in range(paths.cells[a]) if np.isfinite(paths.offset[b, paths.lane[a, i]])]
+            expected = [next((k for k in shared if k >= i), FAR) for i in range(paths.cells[a])]
+            assert paths.joins[a, b, : paths.cells[a]].tolist() == expected

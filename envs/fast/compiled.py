@@ -7,23 +7,34 @@ from typing import Any
 
 import numba
 
-from shield.compiled import fingerprint
+from shield.compiled import UNWRAPPED, fingerprint, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
 _config: Any = numba.config
 
 # Inner functions allocate nothing, so numba need not count references to the arrays they are handed.
-# Counting would cost far more than what they compute. They are compiled into the kernel, which alone
-# is cached.
-compiled = _njit(_nrt=False, error_model="numpy")
+# Counting would cost far more than what they compute.
+_inner = {"_nrt": False, "error_model": "numpy"}
 
-# Calls hand over tuples of arrays field by field. Where that would cost more than the work, the
-# function is merged into its caller.
-merged = _njit(_nrt=False, error_model="numpy", forceinline=True)
+# What Python calls as well, outside the loops.
+callable_too = _njit(**_inner)
 
 # The same for what has one caller only: it becomes part of its source and is never compiled alone,
 # which saves compile time.
-unfolded = _njit(_nrt=False, error_model="numpy", inline="always")
+unfolded = _njit(**_inner, inline="always")
+
+
+def compiled(function):
+    """An inner function. It becomes a part of the kernel, which alone is cached, and is nothing to Python."""
+    return only_inside(_njit(**_inner, **UNWRAPPED)(function))
+
+
+def merged(function):
+    """An inner function merged into its callers.
+
+    Calls hand over tuples of arrays field by field, which may cost more than the work.
+    """
+    return only_inside(_njit(**_inner, **UNWRAPPED, forceinline=True)(function))
 
 
 def kernel(function):
@@ -31,7 +42,7 @@ def kernel(function):
 
     As in `shield.compiled`, any change in what the kernel is made of compiles it anew.
     """
-    dispatcher = _njit(cache=True, nogil=True, _nrt=False, error_model="numpy")(function)
+    dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **_inner)(function)
     here = Path(__file__).parent
     dispatcher._cache._cache_file._source_stamp = fingerprint(*here.glob("*.py"), here.parent / "highway.py")
     return dispatcher

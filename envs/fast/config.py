@@ -7,8 +7,6 @@ default and every override means what it means there.
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-import gymnasium as gym
-import highway_env  # noqa: F401  registers the environments
 import numpy as np
 from gymnasium import spaces
 from highway_env import utils
@@ -19,6 +17,7 @@ from highway_env.vehicle.kinematics import Vehicle
 
 from envs.fast.network import Network, compile_network
 from envs.fast.state import REWARDS
+from envs.stock import make_stock
 
 HIGHWAY, MERGE, TWO_WAY, EXIT, ROUNDABOUT, INTERSECTION = range(6)
 KINEMATICS, TIME_TO_COLLISION = range(2)
@@ -59,11 +58,7 @@ CONFIG = np.dtype(
         ("main_lane", "i8"),  # first lane of the road where the scene plays
         ("side_lane", "i8"),  # where others come from
         ("other_lane", "i8"),
-        ("destination", "i8"),  # of the incoming car, or the ego at an intersection; -1 = drawn
-        ("arm", "i8"),  # lanes from one entry of an intersection to the next
-        ("warm_up_frames", "i8"),  # before the ego appears
-        ("regulation_period", "i8"),  # frames between decisions on who yields, 0 = nobody does
-        ("spawn_probability", "f8"),  # of a new car after each decision
+        ("destination", "i8"),  # of the incoming car, -1 = drawn
         ("obstacle_x", "f8"),  # [m]
         ("obstacle_y", "f8"),
         ("end_x", "f8"),  # the episode ends beyond it [m]
@@ -92,12 +87,25 @@ CONFIG = np.dtype(
     align=True,
 )
 
+# an intersection, where traffic comes, goes and yields
+FLOW = np.dtype(
+    [
+        ("arm", "i8"),  # lanes from one entry to the next
+        ("destination", "i8"),  # of the ego, -1 = drawn
+        ("warm_up_frames", "i8"),  # before the ego appears
+        ("regulation_period", "i8"),  # frames between decisions on who yields
+        ("spawn_probability", "f8"),  # of a new car after each decision
+    ],
+    align=True,
+)
+
 
 class Scenario(NamedTuple):
     """An environment ready to be run by the engine."""
 
     env_id: str
     config: np.ndarray  # `[1]` CONFIG
+    flow: np.ndarray | None  # `[1]` FLOW at an intersection
     network: Network
     target_speeds: np.ndarray  # `[K]` of meta-actions [m/s]
     features: np.ndarray  # `[F]` observed features
@@ -179,7 +187,7 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
     if scenario in (MERGE, TWO_WAY, ROUNDABOUT) and asked != "DiscreteMetaAction":
         raise Unsupported(f"action type {asked} in {env_id}", "DiscreteMetaAction")  # nor does highway-env
     with drivers_unchanged():
-        wrapped = gym.make(env_id, config=config)
+        wrapped = make_stock(env_id, config=config)
     env: Any = wrapped.unwrapped
     given = env.config
     _check(given)
@@ -210,6 +218,7 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
     return Scenario(
         env_id,
         record,
+        _flow(record["dt"][0], given, env, number) if scenario == INTERSECTION else None,
         network,
         target_speeds,
         features,
@@ -401,22 +410,28 @@ def _fill_roundabout(record, given: dict, env, number: dict) -> tuple[str, ...]:
 def _fill_intersection(record, given: dict, env, number: dict) -> tuple[str, ...]:
     # what `IntersectionEnv` writes into the class of its traffic
     record["distance_wanted"], record["comfort_acc_max"], record["comfort_acc_min"] = 7.0, 6.0, -3.0
-    entries = [number[f"o{k}", f"ir{k}", 0] for k in range(4)]
-    record["main_lane"], record["arm"] = entries[0], entries[1] - entries[0]
-    assert entries == list(range(entries[0], entries[3] + 1, entries[1] - entries[0]))
-    asked = given["destination"]
-    if asked and asked not in _ARMS:
-        raise Unsupported(f"destination = {asked!r}", f"None or one of {', '.join(_ARMS)}")
-    record["destination"] = _ARMS.index(asked) if asked else -1
+    record["main_lane"] = number["o0", "ir0", 0]
     record["traffic"] = given["initial_vehicle_count"]
-    record["spawn_probability"] = given["spawn_probability"]
-    record["warm_up_frames"] = 3 * given["simulation_frequency"]
-    record["regulation_period"] = int(1 / record["dt"][0] / env.road.REGULATION_FREQUENCY)
     record["offroad_terminal"] = given["offroad_terminal"]
     record["normalize_reward"] = given["normalize_reward"]
     record["reward_low"], record["reward_high"] = given["collision_reward"], given["arrived_reward"]
     record["speed_low"], record["speed_high"] = given["reward_speed_range"]
     return _set_weights(record, given, ("collision_reward", "high_speed_reward", "arrived_reward", "on_road_reward"))
+
+
+def _flow(dt: float, given: dict, env, number: dict) -> np.ndarray:
+    flow = np.zeros(1, FLOW)
+    entries = [number[f"o{k}", f"ir{k}", 0] for k in range(4)]
+    flow["arm"] = entries[1] - entries[0]
+    assert entries == list(range(entries[0], entries[3] + 1, entries[1] - entries[0]))
+    asked = given["destination"]
+    if asked and asked not in _ARMS:
+        raise Unsupported(f"destination = {asked!r}", f"None or one of {', '.join(_ARMS)}")
+    flow["destination"] = _ARMS.index(asked) if asked else -1
+    flow["warm_up_frames"] = 3 * given["simulation_frequency"]
+    flow["regulation_period"] = int(1 / dt / env.road.REGULATION_FREQUENCY)
+    flow["spawn_probability"] = given["spawn_probability"]
+    return flow
 
 
 _FILL_SCENE = {

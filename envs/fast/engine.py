@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from envs.fast.compiled import compiled, compiling_quickly, kernel, unfolded
-from envs.fast.config import INTERSECTION, Scenario
+from envs.fast.config import Scenario
 from envs.fast.draws import load_generator
 from envs.fast.drivers import take_meta_action
 from envs.fast.frame import act, survey, think
@@ -20,14 +20,19 @@ from envs.fast.guard import (
     MONITOR,
     OFF,
     OVERRIDE,
-    Frames,
+    LaneFrames,
     Past,
+    Ways,
     carry_over,
     check_contact,
-    compile_frames,
+    compile_lane_frames,
+    compile_ways,
+    distances_of,
     is_at_fault,
     make_watch,
-    no_frames,
+    no_lane_frames,
+    no_ways,
+    plans_of,
     refuse_lane_change,
     start_tally,
     start_watch,
@@ -40,7 +45,8 @@ from envs.fast.scenes import make_scene
 from envs.fast.sight import make_sight, sort_along_x
 from envs.fast.state import CAR, EPISODE, STEP
 from envs.fast.traffic_flow import let_traffic_flow, open_intersection
-from envs.highway import LANES, PLANS, Settings
+from envs.highway import PLANS, Settings
+from envs.wrapper import scheme_of
 from shield.junction import CROSSING
 from shield.pair import ROAD_USER
 from shield.params import PRESETS, Rules
@@ -56,8 +62,11 @@ class World(NamedTuple):
     """What does not change."""
 
     config: np.ndarray  # `[1]` CONFIG
+    flow: np.ndarray | None  # `[1]` FLOW where traffic comes and goes
     network: Network
-    frames: Frames
+    # one of the two, even where no shield runs; numba compiles the kernel for either
+    frames: LaneFrames | None
+    ways: Ways | None
     # the rest is as in `Scenario`
     target_speeds: np.ndarray
     labels: np.ndarray
@@ -73,11 +82,9 @@ class Batch(NamedTuple):
     cars: np.ndarray  # `[E, N]` CAR
     episodes: np.ndarray  # `[E]` EPISODE
     order: np.ndarray  # `[E, N]` indices sorted by x
-    # past of the shield, see `guard.Past`; where it needs none, or where there is no shield, N = 0
-    crossings: np.ndarray  # `[E, N]`
-    memory: np.ndarray  # `[E, N]`
-    before: np.ndarray  # `[E, N, 2]`
-    seen: np.ndarray  # `[E, 2, N]`
+    # what the shield remembers; where there is none, N = 0
+    past: Past | None  # with `World.frames`
+    crossings: np.ndarray | None  # `[E, N]` CROSSING, with `World.ways`
 
 
 class Inputs(NamedTuple):
@@ -108,17 +115,33 @@ class Film(NamedTuple):
 
 
 @compiled
-def _restart(cars, episode, order, past, world, sight, watch, mode, step, out):
+def _populate(cars, episode, order, world, sight, flow):
+    config, net = world.config[0], world.network
+    if flow is None:
+        make_scene(cars, episode, order, net, net.lanes, config, world.target_speeds, world.lane_odds)
+    else:
+        open_intersection(cars, episode, order, net, sight, config, flow, world.target_speeds)
+
+
+@compiled
+def _go_on(cars, episode, order, world, plans, watch, mode, flow):
+    """Cars come and go between two decisions."""
+    if flow is not None:
+        was_ego = episode.ego
+        let_traffic_flow(cars, episode, order, world.network, world.config[0], flow[0])
+        if mode != OFF:
+            carry_over(episode, cars, plans.crossings, was_ego, watch)
+
+
+@compiled
+def _restart(cars, episode, order, world, sight, distances, plans, watch, mode, step, out):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
-    if config.scenario == INTERSECTION:
-        open_intersection(cars, episode, order, world.network, sight, config, world.target_speeds)
-    else:
-        make_scene(cars, episode, order, world.network, lanes, config, world.target_speeds, world.lane_odds)
+    _populate(cars, episode, order, world, sight, world.flow)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
-    survey(cars, episode, lanes, sight, config)
+    survey(cars, episode, lanes, sight, world.flow)
     sort_along_x(cars, episode.cars, order)
-    start_watch(episode, past, watch)
+    start_watch(episode, distances, plans, watch)
     start_tally(step)
     rate(cars, episode, NO_ACTION, lanes, sight, config, step)
     step.raw_reward = 0.0
@@ -162,12 +185,12 @@ def _report(cars, episode, mode, cost, step):
 
 
 @unfolded
-def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode, inputs, film, step):
+def _advance(e, cars, episode, order, world, sight, distances, plans, watch, settings, mode, inputs, film, step):
     """One decision of one environment, frame by frame."""
-    config, net = world.config[0], world.network
+    config, net, flow = world.config[0], world.network, world.flow
     lanes = net.lanes
     ego = cars[episode.ego]
-    survey(cars, episode, lanes, sight, config)
+    survey(cars, episode, lanes, sight, flow)
     start_tally(step)
     had_contact = episode.blame != 0
     for frame in range(config.frames):
@@ -177,14 +200,14 @@ def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode,
                 before = ego.target_lane
                 take_meta_action(cars, episode.ego, label, net, lanes, sight, world.target_speeds)
                 if mode != OFF:
-                    refuse_lane_change(before, cars, episode, past, sight, world.frames, settings)
+                    refuse_lane_change(before, cars, episode, sight, plans, settings)
             else:
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
-        think(cars, episode, order, net, sight, config)
+        think(cars, episode, order, net, sight, config, flow)
         if mode != OFF:
-            watch_frame(cars, episode, past, lanes, sight, world.frames, watch, settings, step)
-        act(cars, episode, order, net, sight, config)
+            watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step)
+        act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
             for i in range(len(cars)):
                 film.cars[film.slots[e], frame, i] = cars[i]
@@ -192,7 +215,7 @@ def _advance(e, cars, episode, order, past, world, sight, watch, settings, mode,
     episode.steps += 1
     cost = 0.0
     if mode != OFF:
-        check_contact(cars, episode, past, lanes, sight, world.frames, watch, settings)
+        check_contact(cars, episode, lanes, sight, distances, plans, watch, settings)
         if step.broken_duties > 0 or (not had_contact and is_at_fault(episode.blame)):
             cost = 1.0
     return cost
@@ -204,19 +227,21 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
     config, lanes = world.config[0], world.network.lanes
     for e in range(first, last):
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
-        past = Past(batch.crossings[e], batch.memory[e], batch.before[e], batch.seen[e])
+        distances, plans = distances_of(e, world.frames, batch.past), plans_of(e, world.ways, batch.crossings)
         observation = outputs.observations[e]
         outputs.rewards[e] = 0.0
         outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
-            survey(cars, episode, lanes, sight, config)
+            survey(cars, episode, lanes, sight, world.flow)
             _see(cars, episode, world, sight, observation)
             _report(cars, episode, mode, 0.0, step)
             continue
         if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
-            _restart(cars, episode, order, past, world, sight, watch, mode, step, observation)
+            _restart(cars, episode, order, world, sight, distances, plans, watch, mode, step, observation)
             continue
-        cost = _advance(e, cars, episode, order, past, world, sight, watch, settings, mode, inputs, film, step)
+        cost = _advance(
+            e, cars, episode, order, world, sight, distances, plans, watch, settings, mode, inputs, film, step
+        )
         _see(cars, episode, world, sight, observation)
         reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
         step.raw_reward = reward
@@ -227,16 +252,12 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
         outputs.truncated[e] = is_truncated(episode, config)
         episode.ended = outputs.terminated[e] or outputs.truncated[e]
         _report(cars, episode, mode, cost, step)
-        if config.scenario == INTERSECTION:
-            was_ego = episode.ego
-            let_traffic_flow(cars, episode, order, world.network, config)
-            if mode != OFF:
-                carry_over(episode, cars, past, was_ego, watch)
+        _go_on(cars, episode, order, world, plans, watch, mode, world.flow)
         if episode.ended and autoreset == SAME_STEP:
             for k in range(len(observation)):
                 outputs.final_observations[e, k] = observation[k]
             outputs.final_steps[e] = step
-            _restart(cars, episode, order, past, world, sight, watch, mode, step, observation)
+            _restart(cars, episode, order, world, sight, distances, plans, watch, mode, step, observation)
 
 
 class Engine:
@@ -267,12 +288,25 @@ class Engine:
         self.mode = OFF if settings is None else OVERRIDE if settings.overrides else MONITOR
         self.penalty = float(penalty)
         self.settings = settings or Settings(*PRESETS["simulator"][:2], Rules(), False, 1.0)
-        crossing = n if settings and settings.scheme == PLANS else 0
-        watched = n if settings and settings.scheme == LANES else 0
+        network, net = scenario.stock.road.network, scenario.network
+        watched = n if settings else 0
+        frames = ways = past = crossings = None
+        if scheme_of(scenario.stock) == PLANS:
+            ways = compile_ways(network, net) if settings else no_ways()
+            crossings = np.zeros((num_envs, watched), CROSSING)
+        else:
+            frames = compile_lane_frames(network) if settings else no_lane_frames()
+            past = Past(
+                np.zeros((num_envs, watched), MEMORY),
+                np.zeros((num_envs, watched, 2)),
+                np.zeros((num_envs, 2, watched), ROAD_USER),
+            )
         self.world = World(
             scenario.config,
-            scenario.network,
-            compile_frames(scenario.stock.road.network, scenario.network, settings.scheme) if settings else no_frames(),
+            scenario.flow,
+            net,
+            frames,
+            ways,
             scenario.target_speeds,
             scenario.labels,
             scenario.features,
@@ -284,10 +318,8 @@ class Engine:
             np.zeros((num_envs, n), CAR),
             np.zeros(num_envs, EPISODE),
             np.zeros((num_envs, n), np.int64),
-            np.zeros((num_envs, crossing), CROSSING),
-            np.zeros((num_envs, watched), MEMORY),
-            np.zeros((num_envs, watched, 2)),
-            np.zeros((num_envs, 2, watched), ROAD_USER),
+            past,
+            crossings,
         )
         self.film = Film(np.full(num_envs, -1, np.int64), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
         self._seen: np.ndarray | None = None  # last observations

@@ -1,8 +1,11 @@
-"""One frame of the simulation: everybody decides, then everybody moves."""
+"""One frame of the simulation: everybody decides, then everybody moves.
+
+`flow` is None where no traffic comes and goes. numba compiles the kernel for either kind of road, and for each
+without what only the other needs.
+"""
 
 from envs.fast.collisions import collide
 from envs.fast.compiled import compiled
-from envs.fast.config import INTERSECTION
 from envs.fast.drivers import decide
 from envs.fast.motion import move
 from envs.fast.regulation import regulate
@@ -10,33 +13,33 @@ from envs.fast.sight import line_up, place, project, sort_along_x, update_lanes
 
 
 @compiled
-def survey(cars, episode, lanes, sight, config):
+def survey(cars, episode, lanes, sight, flow):
     """Find out where everybody is. Nobody has moved since their lanes were found."""
-    if config.scenario == INTERSECTION:
-        place(cars, episode.cars, lanes, sight)
-    else:
+    if flow is None:
         project(cars, episode.cars, lanes, sight)
+    else:
+        place(cars, episode.cars, lanes, sight)
 
 
 @compiled
-def think(cars, episode, order, net, sight, config):
+def think(cars, episode, order, net, sight, config, flow):
     """Commands of all vehicles, after a survey."""
-    if config.scenario != INTERSECTION:
+    if flow is None:
         line_up(episode.cars, net.lanes, order, sight)
     decide(cars, episode, net, net.lanes, sight, config)
 
 
 @compiled
-def act(cars, episode, order, net, sight, config):
+def act(cars, episode, order, net, sight, config, flow):
     """Carry the commands out, survey the result and find collisions."""
     lanes = net.lanes
-    if config.regulation_period > 0:
-        regulate(cars, episode, net, sight, config)
+    if flow is not None:
+        regulate(cars, episode, net, sight, config, flow[0])
     move(cars, episode.vehicles, config.dt, config.max_speed, config.min_speed)
-    if config.scenario == INTERSECTION:
-        place(cars, episode.cars, lanes, sight)
-    else:
+    if flow is None:
         project(cars, episode.cars, lanes, sight)
         update_lanes(cars, episode.vehicles, lanes, sight)
+    else:
+        place(cars, episode.cars, lanes, sight)
     sort_along_x(cars, episode.cars, order)
     collide(cars, episode, order, sight, config.dt)

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from envs.fast.collisions import is_near, overlap
-from envs.fast.compiled import compiled, merged, unfolded
+from envs.fast.compiled import compiled, merged
 from envs.fast.floats import norm
 from envs.fast.network import Network, heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
-from envs.highway import PLANS, road_through
+from envs.highway import road_through
 from envs.intent import Junction, Roads, is_outside, list_threats, no_roads, track_of
 from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
@@ -29,28 +29,41 @@ OFF, MONITOR, OVERRIDE = range(3)
 _PLANS = 4  # kinds of danger from here on are plans, in `infos`
 
 
-class Frames(NamedTuple):
-    """What the shield measures by. L lanes."""
+class LaneFrames(NamedTuple):
+    """What the shield measures by where distances along lanes keep the ego safe. L lanes."""
 
-    # where lanes keep the ego safe
     pieces: np.ndarray  # `[P, 8]` pieces of the roads through all lanes
     start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
     same: np.ndarray  # `[L, L]` no gap jumps between the two frames
-    # where plans do
+
+
+class Ways(NamedTuple):
+    """What it goes by where plans do. L lanes."""
+
     roads: Roads  # paths through junctions
     choice: np.ndarray  # `[R + 1, L]` row of the paths of a driver with route R who heads for lane L; last: no route
 
 
 class Past(NamedTuple):
-    """What the shield remembers of one environment with room for N road users, the ego in the last row.
+    """What the shield remembers on lanes: N road users, the ego in the last row. A batch has one more axis in front."""
 
-    Where lanes keep the ego safe there are no `crossings`, and where plans do there is nothing else.
-    """
-
-    crossings: np.ndarray  # `[N]` CROSSING
     memory: np.ndarray  # `[N]` MEMORY
     before: np.ndarray  # `[N, 2]` positions one frame ago, nan at first sight [m]
     seen: np.ndarray  # `[2, N]` ROAD_USER of the last two frames; `episode.turn` is the row of the last one
+
+
+class Distances(NamedTuple):
+    """One ego kept safe by distances along its lane (Defs. 1-10)."""
+
+    frames: LaneFrames
+    past: Past
+
+
+class Plans(NamedTuple):
+    """One ego kept safe by plans (Defs. 14-18)."""
+
+    ways: Ways
+    crossings: np.ndarray  # `[N]` CROSSING, what is remembered of the others
 
 
 class Watch(NamedTuple):
@@ -61,22 +74,17 @@ class Watch(NamedTuple):
     blank_crossing: np.ndarray  # `[1]` CROSSING likewise
 
 
-def compile_frames(network, net: Network, scheme: int) -> Frames:
-    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`, and the paths through its junctions.
-
-    Args:
-      network: the road network, net: the same as arrays.
-      scheme: what keeps the ego safe, as in `Settings`.
-    """
-    if scheme == PLANS:
-        junction = junction_of(network)
-        return no_frames()._replace(roads=junction.roads, choice=_choices(junction, network, net))
+def compile_lane_frames(network) -> LaneFrames:
+    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`."""
     lanes = [road_through(network, index) for index in network.lanes_dict()]
-    return no_frames()._replace(
-        pieces=np.concatenate(lanes),
-        start=np.cumsum([0, *map(len, lanes)]),
-        same=np.array([[same_frame(a, b) for b in lanes] for a in lanes]),
-    )
+    same = np.array([[same_frame(a, b) for b in lanes] for a in lanes])
+    return LaneFrames(np.concatenate(lanes), np.cumsum([0, *map(len, lanes)]), same)
+
+
+def compile_ways(network, net: Network) -> Ways:
+    """The paths through the junctions of a `highway_env.road.road.RoadNetwork`; `net`: the same as arrays."""
+    junction = junction_of(network)
+    return Ways(junction.roads, _choices(junction, network, net))
 
 
 def _choices(junction: Junction, network, net: Network) -> np.ndarray:
@@ -85,10 +93,14 @@ def _choices(junction: Junction, network, net: Network) -> np.ndarray:
     return np.array([[junction.choice(index, route) for index in network.lanes_dict()] for route in [*routes, []]])
 
 
-def no_frames() -> Frames:
+def no_lane_frames() -> LaneFrames:
     """Stands in where no shield runs."""
-    none = np.zeros((0, 0), bool)
-    return Frames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), none, no_roads(), np.zeros((1, 0), np.int64))
+    return LaneFrames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), np.zeros((0, 0), bool))
+
+
+def no_ways() -> Ways:
+    """Stands in where no shield runs."""
+    return Ways(no_roads(), np.zeros((1, 0), np.int64))
 
 
 def make_watch(heading_bound):
@@ -100,14 +112,36 @@ def make_watch(heading_bound):
     return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING))
 
 
+# Of the next two one is None, and numba leaves out of the kernel what it would need.
+
+
 @compiled
-def start_watch(episode, past, watch):
+def distances_of(e, frames, past):
+    """`Distances` of environment `e` of a batch."""
+    if frames is None:
+        return None
+    return Distances(frames, Past(past.memory[e], past.before[e], past.seen[e]))
+
+
+@compiled
+def plans_of(e, ways, crossings):
+    """`Plans` of environment `e` of a batch."""
+    if ways is None:
+        return None
+    return Plans(ways, crossings[e])
+
+
+@compiled
+def start_watch(episode, distances, plans, watch):
     """Forget everything at the start of an episode."""
-    for i in range(len(past.crossings)):
-        past.crossings[i] = watch.blank_crossing[0]
-    for i in range(len(past.memory)):
-        past.memory[i] = watch.blank[0]
-        past.before[i, 0] = past.before[i, 1] = np.nan
+    if distances is not None:
+        past = distances.past
+        for i in range(len(past.memory)):
+            past.memory[i] = watch.blank[0]
+            past.before[i, 0] = past.before[i, 1] = np.nan
+    if plans is not None:
+        for i in range(len(plans.crossings)):
+            plans.crossings[i] = watch.blank_crossing[0]
     episode.frame_lane, episode.turn, episode.go, episode.frames_trapped = -1, 0, -1, 0
     episode.path = -1
     episode.pairs_examined = episode.pairs_possible = 0
@@ -122,17 +156,17 @@ def start_watch(episode, past, watch):
 
 
 @compiled
-def carry_over(episode, cars, past, ego, watch):
+def carry_over(episode, cars, crossings, ego, watch):
     """Cars came and went, as they do at intersections: everybody's past moves along.
 
     Args:
       ego: index of the ego before.
     """
-    for i in range(len(past.crossings) - 1):
+    for i in range(len(crossings) - 1):
         k = _car_of(i, episode)
         was = cars[k].was if k < episode.cars else -1
         # those after a gap move up
-        past.crossings[i] = watch.blank_crossing[0] if was < 0 else past.crossings[was if was < ego else was - 1]
+        crossings[i] = watch.blank_crossing[0] if was < 0 else crossings[was if was < ego else was - 1]
 
 
 @compiled
@@ -144,38 +178,37 @@ def start_tally(step):
     step.partner, step.response = -1, 0
 
 
-@unfolded
-def watch_frame(cars, episode, past, lanes, sight, frames, watch, settings, step):
+@compiled
+def watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step):
     """Restrict the ego's command on one frame, unless it has had its contact.
 
     Args:
       cars: `[N]` CAR, all commands chosen.
       episode: EPISODE.
-      past: `Past`.
       lanes: `[L]` LANE.
       sight: this frame's.
-      frames: `Frames` of the network.
+      distances, plans: `Distances` or `Plans`; the other is None.
       watch: `Watch`.
       settings: `envs.highway.Settings`.
       step: STEP, the tally is kept there.
     """
-    if check_contact(cars, episode, past, lanes, sight, frames, watch, settings):
+    if check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
         return
-    if settings.scheme == PLANS:
-        _keep_plan(cars, episode, past, sight, frames, settings, step)
-    else:
-        _keep_distances(cars, episode, past, lanes, sight, frames, watch, settings, step)
+    if plans is not None:
+        _keep_plan(cars, episode, sight, plans, settings, step)
+    if distances is not None:
+        _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step)
 
 
 @compiled
-def _keep_distances(cars, episode, past, lanes, sight, frames, watch, settings, step):
+def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step):
     """Defs. 1-10, along the lane of the ego."""
-    car = cars[episode.ego]
+    car, past = cars[episode.ego], distances.past
     if car.kind == DIRECT:
         acceleration, steering = episode.nominal_acceleration, episode.nominal_steering
     else:
         acceleration, steering = car.acceleration, car.steering
-    curvature = _sense(cars, episode, past, lanes, sight, frames, watch, settings)
+    curvature = _sense(cars, episode, lanes, sight, distances, watch, settings)
     n, last = episode.cars - 1, len(past.memory) - 1
     now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
     ego, users, memory = now[last], now[:n], past.memory[:n]
@@ -210,14 +243,14 @@ def _keep_distances(cars, episode, past, lanes, sight, frames, watch, settings, 
 
 
 @compiled
-def _keep_plan(cars, episode, past, sight, frames, settings, step):
+def _keep_plan(cars, episode, sight, plans, settings, step):
     """Defs. 14-18: a plan through the junction ahead."""
     car, n = cars[episode.ego], episode.cars - 1
-    scene = _scene(cars, episode, past, sight, frames, settings)
-    plans = junction_frame(
+    scene = _scene(cars, episode, sight, plans, settings)
+    report = junction_frame(
         scene,
         sight.samples[:n],
-        past.crossings[:n],
+        plans.crossings[:n],
         episode,
         car.acceleration,
         settings.entry,
@@ -226,12 +259,12 @@ def _keep_plan(cars, episode, past, sight, frames, settings, step):
         settings.overrides,
     )
     if settings.overrides:
-        step.acceleration_change = max(step.acceleration_change, abs(plans.acceleration - car.acceleration))
-        car.acceleration = plans.acceleration
-    _count(episode, step, plans, plans.pairs, plans.broken, settings.overrides)
-    episode.frames_trapped += plans.trapped
-    episode.pairs_examined += plans.examined
-    episode.pairs_possible += plans.possible
+        step.acceleration_change = max(step.acceleration_change, abs(report.acceleration - car.acceleration))
+        car.acceleration = report.acceleration
+    _count(episode, step, report, report.pairs, report.broken, settings.overrides)
+    episode.frames_trapped += report.trapped
+    episode.pairs_examined += report.examined
+    episode.pairs_possible += report.possible
 
 
 @merged
@@ -253,36 +286,42 @@ def _count(episode, step, report, pairs, broken, overrides):
 
 
 @compiled
-def refuse_lane_change(before, cars, episode, past, sight, frames, settings):
+def refuse_lane_change(before, cars, episode, sight, plans, settings):
     """Take back a lane change of this decision that leaves no plan; `before` is the lane the ego headed for."""
-    ego = cars[episode.ego]
     episode.refused = False
-    if settings.scheme != PLANS or not settings.overrides or episode.blame != 0 or ego.kind != META:
+    if plans is not None:
+        _refuse_lane_change(before, cars, episode, sight, plans, settings)
+
+
+@compiled
+def _refuse_lane_change(before, cars, episode, sight, plans, settings):
+    ego = cars[episode.ego]
+    if not settings.overrides or episode.blame != 0 or ego.kind != META:
         return
-    lanes = frames.roads.lanes
+    lanes = plans.ways.roads.lanes
     if ego.target_lane == before or lanes[ego.target_lane].road != lanes[before].road:
         return
     n, path = episode.cars - 1, episode.path
-    scene = _scene(cars, episode, past, sight, frames, settings)
-    if not has_plan(scene, past.crossings[:n], settings.entry, not settings.waits_anywhere):
+    scene = _scene(cars, episode, sight, plans, settings)
+    if not has_plan(scene, plans.crossings[:n], settings.entry, not settings.waits_anywhere):
         ego.target_lane, episode.path = before, path
         episode.refused = True
 
 
 @compiled
-def _scene(cars, episode, past, sight, frames, settings):
+def _scene(cars, episode, sight, plans, settings):
     """The ego's track and the ways that the others may take."""
-    n = episode.cars - 1
+    n, roads = episode.cars - 1, plans.ways.roads
     for i in range(n):
-        _describe(cars[_car_of(i, episode)], frames, sight.on_road[i])
-    _describe(cars[episode.ego], frames, sight.on_road[n])
-    track = track_of(frames.roads, sight.on_road[n], episode.path)
+        _describe(cars[_car_of(i, episode)], plans.ways.choice, sight.on_road[i])
+    _describe(cars[episode.ego], plans.ways.choice, sight.on_road[n])
+    track = track_of(roads, sight.on_road[n], episode.path)
     episode.path = track.path
     count = list_threats(
-        frames.roads,
+        roads,
         track,
         sight.on_road[:n],
-        past.crossings[:n],
+        plans.crossings[:n],
         settings.intent,
         settings.other.v_cap,
         sight.samples,
@@ -292,11 +331,11 @@ def _scene(cars, episode, past, sight, frames, settings):
     if count > len(sight.threats):
         episode.overflow = True
     count = min(count, len(sight.threats))
-    return Scene(frames.roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, 0.0)
+    return Scene(roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, 0.0)
 
 
 @compiled
-def _describe(car, frames, out):
+def _describe(car, choice, out):
     out.x, out.y, out.heading, out.speed, out.length, out.width = (
         car.x,
         car.y,
@@ -308,7 +347,7 @@ def _describe(car, frames, out):
     out.wreck = car.crashed or car.kind == OBSTACLE
     out.on, out.lane, out.choice = car.lane, -1, -1
     if car.kind == TRAFFIC or car.kind == META:
-        out.lane, out.choice = car.target_lane, frames.choice[car.route, car.target_lane]
+        out.lane, out.choice = car.target_lane, choice[car.route, car.target_lane]
 
 
 @compiled
@@ -318,9 +357,9 @@ def _car_of(user, episode):
 
 
 @compiled
-def _sense(cars, episode, past, lanes, sight, frames, watch, settings):
+def _sense(cars, episode, lanes, sight, distances, watch, settings):
     """Take in everybody in the ego's lane frame, the ego last; returns the lane's curvature."""
-    n, ego = episode.cars, cars[episode.ego]
+    n, ego, frames, past = episode.cars, cars[episode.ego], distances.frames, distances.past
     episode.turn = 1 - episode.turn
     users, before = past.seen[episode.turn], past.before
     if ego.lane != episode.frame_lane:
@@ -366,22 +405,19 @@ def _in_own_lane(k, car, ego, lanes, sight):
 
 
 @compiled
-def check_contact(cars, episode, past, lanes, sight, frames, watch, settings):
+def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
     """Has the ego touched somebody, or is it about to? Judged at the first such sample."""
     ego = cars[episode.ego]
     if episode.blame == 0 and (ego.crashed or ego.hit):
-        _judge(cars, episode, past, lanes, sight, frames, watch, settings)
+        _judge(cars, episode, lanes, sight, distances, plans, watch, settings)
     return episode.blame != 0
 
 
 @compiled
-def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
-    plans = settings.scheme == PLANS
-    if not plans:
-        _sense(cars, episode, past, lanes, sight, frames, watch, settings)
-    n, last = episode.cars - 1, len(past.memory) - 1
-    now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
-    heaviest, touched = -1, False
+def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
+    if distances is not None:
+        _sense(cars, episode, lanes, sight, distances, watch, settings)
+    n, heaviest, touched = episode.cars - 1, -1, False
     for i in range(n):
         touched |= _touches(cars, _car_of(i, episode), episode.ego, sight, settings.dt)
     nearest = _nearest(cars, episode) if not touched else -1
@@ -389,23 +425,33 @@ def _judge(cars, episode, past, lanes, sight, frames, watch, settings):
         k = _car_of(i, episode)
         if not (_touches(cars, k, episode.ego, sight, settings.dt) if touched else k == nearest):
             continue
-        if plans:
-            scene = _scene(cars, episode, past, sight, frames, settings)
-            outside = is_outside(scene.paths, scene.threats, i, sight.on_road[i])
-            verdict = judge_crossing(sight.samples[i], past.crossings[i], outside, settings.other, settings.dt)
-        else:
-            memory = past.memory[i]
-            catch_up(memory, then[last], then[i], settings.ego, settings.other, settings.rules, settings.dt)
-            verdict = judge_contact(
-                now[last], now[i], memory, settings.ego, settings.other, settings.rules, settings.dt
-            )
+        verdict, axes = _verdict(i, cars, episode, sight, distances, plans, settings)
         weight = _weight(verdict.verdict)
         if weight > heaviest:
             heaviest = weight
             episode.blame, episode.blame_partner = 1 + verdict.verdict, k
-            episode.blame_axes, episode.blame_frames = verdict.axes + _PLANS * plans, verdict.frames
+            episode.blame_axes, episode.blame_frames = axes, verdict.frames
             episode.ego_duty, episode.ego_excess = verdict.ego_duty, verdict.ego_excess
             episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
+
+
+@compiled
+def _verdict(i, cars, episode, sight, distances, plans, settings):
+    """Who is to blame for the contact with road user `i`, and where the danger came from, as in `infos`."""
+    ego, other, rules, dt = settings.ego, settings.other, settings.rules, settings.dt
+    if plans is not None:
+        scene = _scene(cars, episode, sight, plans, settings)
+        outside = is_outside(scene.paths, scene.threats, i, sight.on_road[i])
+        verdict = judge_crossing(sight.samples[i], plans.crossings[i], outside, other, dt)
+        axes = verdict.axes + _PLANS
+    if distances is not None:
+        past = distances.past
+        memory, last = past.memory[i], len(past.memory) - 1
+        now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
+        catch_up(memory, then[last], then[i], ego, other, rules, dt)
+        verdict = judge_contact(now[last], now[i], memory, ego, other, rules, dt)
+        axes = verdict.axes
+    return verdict, axes
 
 
 @compiled

@@ -11,7 +11,7 @@ import numpy as np
 from highway_env.road.lane import CircularLane, SineLane, StraightLane
 from highway_env.vehicle.controller import ControlledVehicle
 
-from envs.fast.compiled import compiled
+from envs.fast.compiled import callable_too, compiled
 from envs.fast.floats import dot, norm, wrap_to_pi
 from envs.fast.state import CAR_LENGTH
 
@@ -178,7 +178,7 @@ def _padded(rows, dtype, filler, width: int = 1) -> np.ndarray:
 # ---------------------------------------------------------------- coordinates
 
 
-@compiled
+@callable_too
 def local_coordinates(lane, x, y):
     """Arc length and signed lateral offset of a point on a lane [m]."""
     dx, dy = x - lane.x, y - lane.y
@@ -192,7 +192,7 @@ def local_coordinates(lane, x, y):
     return s, lateral
 
 
-@compiled
+@callable_too
 def position(lane, s, lateral):
     """World position of a point given in lane coordinates [m]."""
     if lane.kind == CIRCULAR:
@@ -204,7 +204,7 @@ def position(lane, s, lateral):
     return lane.x + s * lane.dx + lateral * lane.lx, lane.y + s * lane.dy + lateral * lane.ly
 
 
-@compiled
+@callable_too
 def heading_at(lane, s):
     """Heading of a lane at arc length `s` [rad]."""
     if lane.kind == STRAIGHT:

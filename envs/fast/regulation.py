@@ -18,7 +18,7 @@ _LOWEST, _HIGHEST = MOMENTS, MOMENTS + 1  # rows of `sight.futures` after those 
 
 
 @compiled
-def regulate(cars, episode, net, sight, config):
+def regulate(cars, episode, net, sight, config, flow):
     """Decide who yields, if it is time to.
 
     Args:
@@ -27,9 +27,10 @@ def regulate(cars, episode, net, sight, config):
       net: the network.
       sight: this frame's.
       config: CONFIG.
+      flow: FLOW.
     """
     episode.road_frames += 1
-    if episode.road_frames % config.regulation_period != 0:
+    if episode.road_frames % flow.regulation_period != 0:
         return
     lanes, futures = net.lanes, sight.futures
     n = episode.cars

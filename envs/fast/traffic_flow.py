@@ -17,7 +17,7 @@ _LEAVING = 20.0  # cars vanish that far before the end of the world [m]
 
 
 @compiled
-def open_intersection(cars, episode, order, net, sight, config, target_speeds):
+def open_intersection(cars, episode, order, net, sight, config, flow, target_speeds):
     """Populate the roads, let the traffic run for three seconds, then add the ego.
 
     Args:
@@ -27,6 +27,7 @@ def open_intersection(cars, episode, order, net, sight, config, target_speeds):
       net: the network.
       sight: working memory.
       config: CONFIG.
+      flow: `[1]` FLOW.
       target_speeds: `[K]` of meta-actions [m/s].
     """
     lanes = net.lanes
@@ -35,20 +36,20 @@ def open_intersection(cars, episode, order, net, sight, config, target_speeds):
         cars[i].length = 0.0
     n = config.traffic
     for t in range(n - 1):
-        _arrive(cars, episode, t * (80.0 / (n - 1)), 1.0, 1.0, 0.6, _ANYWHERE, net, config)
+        _arrive(cars, episode, t * (80.0 / (n - 1)), 1.0, 1.0, 0.6, _ANYWHERE, net, config, flow[0])
     _renumber(cars, episode, order)
-    survey(cars, episode, lanes, sight, config)
-    for _ in range(config.warm_up_frames):
-        think(cars, episode, order, net, sight, config)
-        act(cars, episode, order, net, sight, config)
-    _arrive(cars, episode, 60.0, 0.1, 0.0, 1.0, _STRAIGHT_ON, net, config)
-    _add_ego_on_its_way(cars, episode, net, config, target_speeds)
+    survey(cars, episode, lanes, sight, flow)
+    for _ in range(flow[0].warm_up_frames):
+        think(cars, episode, order, net, sight, config, flow)
+        act(cars, episode, order, net, sight, config, flow)
+    _arrive(cars, episode, 60.0, 0.1, 0.0, 1.0, _STRAIGHT_ON, net, config, flow[0])
+    _add_ego_on_its_way(cars, episode, net, config, flow[0], target_speeds)
     _renumber(cars, episode, order)
     episode.observed_lanes = lanes[cars[episode.ego].lane].siblings
 
 
 @compiled
-def let_traffic_flow(cars, episode, order, net, config):
+def let_traffic_flow(cars, episode, order, net, config, flow):
     """After each decision: cars that leave are gone, and a new one may come."""
     for i in range(len(cars)):
         cars[i].was = i if i < episode.cars else -1
@@ -59,7 +60,7 @@ def let_traffic_flow(cars, episode, order, net, config):
             _remove(cars, episode, i)
         else:
             i += 1
-    _arrive(cars, episode, 0.0, 1.0, 1.0, config.spawn_probability, _ANYWHERE, net, config)
+    _arrive(cars, episode, 0.0, 1.0, 1.0, flow.spawn_probability, _ANYWHERE, net, config, flow)
     _renumber(cars, episode, order)
 
 
@@ -70,14 +71,14 @@ def _arc_length(lane, car):
 
 
 @compiled
-def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, net, config):
+def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, net, config, flow):
     """Perhaps put a new car on one of the entries, around arc length `s` [m], bound for another arm."""
     if random(episode) > probability:
         return
     origin, destination = two_of(episode, 4)
     if bound == _STRAIGHT_ON:
         destination = (origin + 2) % 4
-    lane = net.lanes[config.main_lane + origin * config.arm]
+    lane = net.lanes[config.main_lane + origin * flow.arm]
     s = s + 5.0 + normal(episode) * deviation
     speed = 8.0 + normal(episode) * speed_deviation
     x, y = position(lane, s, 0.0)
@@ -93,9 +94,9 @@ def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, ne
 
 
 @compiled
-def _add_ego_on_its_way(cars, episode, net, config, target_speeds):
+def _add_ego_on_its_way(cars, episode, net, config, flow, target_speeds):
     """Put the ego on the southern entry and clear its surroundings."""
-    destination = config.destination
+    destination = flow.destination
     if destination < 0:
         destination = 1 + integers(episode, 3)
     lane = net.lanes[config.main_lane]

@@ -6,6 +6,8 @@ from gymnasium.vector import AutoresetMode
 
 import envs
 from envs.fast.config import Unsupported, compile_scenario
+from envs.fast.drivers import SLOWER
+from envs.stock import LONGEST_EPISODE
 
 ENV = "highway-fast-v0"
 
@@ -52,6 +54,15 @@ def test_an_environment_does_not_depend_on_its_neighbours():
     few = envs.make_vec(ENV, 2)
     observations, _ = few.reset(seed=7)
     assert np.array_equal(observations, many[0][:2])
+
+
+@pytest.mark.parametrize("backend", ["fast", "highway-env"])
+def test_an_episode_that_highway_env_would_never_end_is_truncated(backend):
+    creep = {"action": {"type": "DiscreteMetaAction", "target_speeds": [0, 1, 2]}}
+    env = envs.make_vec("merge-v0", 1, backend=backend, config=creep)
+    env.reset(seed=0)
+    ends = [np.concatenate(env.step(np.array([SLOWER]))[2:4]).tolist() for _ in range(LONGEST_EPISODE)]
+    assert ends == [[False, False]] * (LONGEST_EPISODE - 1) + [[False, True]]
 
 
 def test_seeds_may_be_given_one_by_one():
