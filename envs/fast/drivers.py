@@ -1,6 +1,7 @@
 """What each vehicle decides on a frame: speed and steering controllers, IDM, MOBIL, route following.
 
-Vehicles decide one after the other, and later ones see the target lanes of earlier ones.
+Vehicles decide one after the other, and later ones see the target lanes of earlier ones. So does the shield, in the
+ego's turn.
 """
 
 import numpy as np
@@ -19,23 +20,32 @@ _KP_ACCELERATION = ControlledVehicle.KP_A  # [1/s]
 
 
 @compiled
-def decide(cars, episode, net, lanes, sight, idm):
-    """Commands of all vehicles for one frame.
-
-    Args:
-      cars: `[N]` CAR.
-      episode: EPISODE.
-      net, lanes: the network and its LANE records.
-      sight: this frame's, with the cars lined up.
-      idm: CONFIG, parameters of the traffic.
-    """
-    n = episode.cars
+def list_changing(cars, n, sight):
+    """Fill `sight.changing` with the cars that head for another lane; returns how many."""
     changing = np.int64(0)
     for i in range(n):
         if cars[i].target_lane != cars[i].lane:
             sight.changing[changing] = i
             changing += 1
-    for i in range(episode.vehicles):
+    return changing
+
+
+@compiled
+def decide(cars, first, last, n, changing, net, lanes, sight, idm):
+    """Commands of the vehicles `first` to `last` - 1 for one frame.
+
+    Args:
+      cars: `[N]` CAR.
+      n: road users.
+      changing: how many cars change lanes, see `list_changing`.
+      net, lanes: the network and its LANE records.
+      sight: this frame's, with the cars lined up.
+      idm: CONFIG, parameters of the traffic.
+
+    Returns:
+      `changing`, with those that have just begun.
+    """
+    for i in range(first, last):
         car = cars[i]
         if car.kind == TRAFFIC:
             if not car.crashed:
@@ -46,6 +56,7 @@ def decide(cars, episode, net, lanes, sight, idm):
                     changing += 1
         elif car.kind == META:
             control(cars, i, net, lanes, sight)
+    return changing
 
 
 # ---------------------------------------------------------------- the controlled vehicle

@@ -15,7 +15,7 @@ from envs.fast.compiled import compiled, compiling_quickly, kernel, unfolded
 from envs.fast.config import Scenario
 from envs.fast.draws import load_generator
 from envs.fast.drivers import take_meta_action
-from envs.fast.frame import act, survey, think
+from envs.fast.frame import act, look_around, survey, think
 from envs.fast.guard import (
     MONITOR,
     OFF,
@@ -204,9 +204,11 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, watch, set
             else:
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
-        think(cars, episode, order, net, sight, config, flow)
+        changing = look_around(cars, episode, order, net, sight, flow)
+        changing = think(cars, episode, 0, episode.ego + 1, changing, net, sight, config)
         if mode != OFF:
             watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step)
+        think(cars, episode, episode.ego + 1, episode.vehicles, changing, net, sight, config)
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
             for i in range(len(cars)):

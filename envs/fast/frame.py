@@ -6,7 +6,7 @@ without what only the other needs.
 
 from envs.fast.collisions import collide
 from envs.fast.compiled import compiled
-from envs.fast.drivers import decide
+from envs.fast.drivers import decide, list_changing
 from envs.fast.motion import move
 from envs.fast.regulation import regulate
 from envs.fast.sight import line_up, place, project, sort_along_x, update_lanes
@@ -22,11 +22,17 @@ def survey(cars, episode, lanes, sight, flow):
 
 
 @compiled
-def think(cars, episode, order, net, sight, config, flow):
-    """Commands of all vehicles, after a survey."""
+def look_around(cars, episode, order, net, sight, flow):
+    """Get ready to `think`, after a survey; returns how many cars change lanes."""
     if flow is None:
         line_up(episode.cars, net.lanes, order, sight)
-    decide(cars, episode, net, net.lanes, sight, config)
+    return list_changing(cars, episode.cars, sight)
+
+
+@compiled
+def think(cars, episode, first, last, changing, net, sight, config):
+    """Commands of the vehicles `first` to `last` - 1; returns how many cars change lanes then."""
+    return decide(cars, first, last, episode.cars, changing, net, net.lanes, sight, config)
 
 
 @compiled

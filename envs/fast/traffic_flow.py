@@ -5,7 +5,7 @@ import numpy as np
 from envs.fast.compiled import compiled
 from envs.fast.draws import integers, normal, random, two_of, uniform
 from envs.fast.floats import norm
-from envs.fast.frame import act, survey, think
+from envs.fast.frame import act, look_around, survey, think
 from envs.fast.network import heading_at, local_coordinates, position
 from envs.fast.scenes import add_ego, add_on_lane
 from envs.fast.sight import sort_along_x
@@ -40,7 +40,8 @@ def open_intersection(cars, episode, order, net, sight, config, flow, target_spe
     _renumber(cars, episode, order)
     survey(cars, episode, lanes, sight, flow)
     for _ in range(flow[0].warm_up_frames):
-        think(cars, episode, order, net, sight, config, flow)
+        changing = look_around(cars, episode, order, net, sight, flow)
+        think(cars, episode, 0, episode.vehicles, changing, net, sight, config)
         act(cars, episode, order, net, sight, config, flow)
     _arrive(cars, episode, 60.0, 0.1, 0.0, 1.0, _STRAIGHT_ON, net, config, flow[0])
     _add_ego_on_its_way(cars, episode, net, config, flow[0], target_speeds)

@@ -40,18 +40,21 @@ def actions_of(policy: str, space, rng):
     return int(rng.integers(space.n)) if policy == "random" else names[policy][int(space.n)]
 
 
-def compare(env_id, seeds, policy="random", config=None, shield=None, max_steps=60, until=None) -> Comparison:
+def compare(
+    env_id, seeds, policy="random", config=None, shield=None, max_steps=60, until=None, **options
+) -> Comparison:
     """Run one episode per seed on both and compare everything after every decision.
 
     Args:
+      options: of the shield.
       until: called with the number of decisions so far; stops when it returns True.
     """
     with drivers_unchanged():
-        return _compare(env_id, list(seeds), policy, config, shield, max_steps, until)
+        return _compare(env_id, list(seeds), policy, config, shield, max_steps, until, options)
 
 
-def _compare(env_id, seeds, policy, config, shield, max_steps, until) -> Comparison:
-    stock = envs.make(env_id, shield=shield, config=config)
+def _compare(env_id, seeds, policy, config, shield, max_steps, until, options) -> Comparison:
+    stock = envs.make(env_id, shield=shield, config=config, **options)
     settings = stock.settings if shield else None
     engine = Engine(compile_scenario(env_id, config), 1, settings, autoreset=DISABLED)
     largest = {"state": 0.0, "reward": 0.0, "ulps": 0}

@@ -42,6 +42,14 @@ def test_episodes_agree_to_the_last_bit(options):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.parametrize(
+    ("env_id", "seeds"), [("roundabout-v0", [12664, 4400]), ("roundabout-v1", [67, 0]), ("intersection-v0", [0, 1])]
+)
+def test_known_routes_are_read_at_the_same_moment(env_id, seeds):
+    """On a roundabout the ego decides first, before others head for their next lanes; at an intersection last."""
+    _agree(compare(env_id, seeds, "faster", shield="override", intent="known"))
+
+
 @pytest.mark.parametrize("policy", POLICIES)
 def test_highway_v0_agrees(policy):
     _agree(compare("highway-v0", range(1), policy, max_steps=6))
