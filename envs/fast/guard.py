@@ -90,7 +90,14 @@ def compile_ways(network, net: Network) -> Ways:
 def _choices(junction: Junction, network, net: Network) -> np.ndarray:
     ways = [(origin, end) for origin, ends in network.graph.items() for end in ends]
     routes = [[ways[road] for road in roads if road >= 0] for roads in net.route_roads]
-    return np.array([[junction.choice(index, route) for index in network.lanes_dict()] for route in [*routes, []]])
+    return np.array(
+        [[junction.choice(index, _rest(route, index)) for index in network.lanes_dict()] for route in [*routes, []]]
+    )
+
+
+def _rest(route: list, index: tuple) -> list:
+    """A route from a lane on: who drives around a ring comes twice where the route begins."""
+    return route[route.index(index[:2]) :] if index[:2] in route else route
 
 
 def no_lane_frames() -> LaneFrames:
