@@ -12,7 +12,7 @@ import numpy as np
 from envs.fast.network import LANE, compile_network, heading_at, local_coordinates
 from envs.paths import beside, compile_paths, lead_of, successors_of, walks
 from shield.compiled import compiled
-from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y, cell_of, reach_beyond
+from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y, cell_of, reach_beyond, reaches_into
 from shield.geometry import wrap_angle
 from shield.junction import block
 from shield.plans import KNOWN, STRAIGHT, Track
@@ -22,6 +22,10 @@ _TURNED = np.pi / 3  # angle to the lane up to which it may be [rad]
 _BEYOND = 3.0  # how far after its end, and before its start or where the lane before leads to it [m]
 _OFF_KNOWN, _TURNED_KNOWN, _BEYOND_KNOWN = 4.0, 1.4, 12.0  # likewise for a lane that it is known to head for
 _BETWEEN = 1.0  # further from the middle of the lane it heads for, a car is on the one beside it too [m]
+# Nobody sweeps the lane that it leaves any more when it is `_CLEAR` from the middle of the one that it heads for
+# [m]. highway-env's drivers steer at up to 45 deg, and come nearer by a factor of e in `_DECAY` [s]; to turn the
+# wheels and to straighten up takes them `_TURN_TIME` [s] and `_TURN_LENGTH` [m].
+_CLEAR, _DECAY, _TURN_TIME, _SLANT, _TURN_LENGTH = 1.5, 0.6, 0.4, 2.0, 3.0
 _ROLL = 1.05  # a wreck rolls to rest in this time at its speed [s]
 
 # One road user in the world, as a simulator says.
@@ -54,6 +58,7 @@ class Roads(NamedTuple):
     lead: np.ndarray  # `[L]` how far before its start cars come to a lane [m]
     following: np.ndarray  # `[L]` each lane and those that follow, as sets of bits
     beside: np.ndarray  # `[L]` each lane and those beside it, likewise
+    alongside: np.ndarray  # `[P, L]` path through each lane that goes on as much as possible like each path
 
 
 def no_roads() -> Roads:
@@ -81,6 +86,7 @@ def no_roads() -> Roads:
         np.zeros(0),
         rows,
         rows,
+        none,
     )
 
 
@@ -104,7 +110,9 @@ class Junction:
         self.lead, self.following, self.beside = lead_of(network), successors_of(network), beside(network)
         self.limit = float(lanes["speed_limit"].max())
         self.lanes = lanes
+        alongside = [[self._most_alike(walk, index) for index in self.number] for walk in self.walks]
         self._arrays = (compile_paths(network, self.limit, room), np.array(through), np.array(straight))
+        self.alongside = np.array(alongside)
 
     def __deepcopy__(self, memo) -> "Junction":
         return self  # what is added later are answers to questions
@@ -116,17 +124,34 @@ class Junction:
         choices = np.full((len(self._rows), max(map(len, self._rows))), -1)
         for row, numbers in enumerate(self._rows):
             choices[row, : len(numbers)] = numbers
-        return Roads(paths, self.lanes, choices, through, straight, self.limit, self.lead, self.following, self.beside)
+        return Roads(
+            paths,
+            self.lanes,
+            choices,
+            through,
+            straight,
+            self.limit,
+            self.lead,
+            self.following,
+            self.beside,
+            self.alongside,
+        )
 
     def choice(self, index, route) -> int:
         """Row of the paths of a driver who heads for lane `index` with `route` ahead; a driver without a route: any."""
         key = (index, tuple(step[:2] for step in route or ()))
         if key not in self._known:
-            ways = self._distinct(index)
-            agreement = [_agreement(self._after(p, index), index, key[1]) for p in ways]
-            best = max(agreement)
-            self._known[key] = self._row([p for p, steps in zip(ways, agreement, strict=True) if steps == best])
+            self._known[key] = self._row(self._alike(index, key[1]))
         return self._known[key]
+
+    def _alike(self, index, route) -> list[int]:
+        """Of the paths through a lane, those that follow a route the longest."""
+        ways = self._distinct(index)
+        agreement = [_agreement(self._after(p, index), index, route) for p in ways]
+        return [p for p, steps in zip(ways, agreement, strict=True) if steps == max(agreement)]
+
+    def _most_alike(self, walk, index) -> int:
+        return self._alike(index, [lane[:2] for lane in walk])[0]
 
     def _after(self, path: int, index) -> list[tuple]:
         walk = self.walks[path]
@@ -155,19 +180,46 @@ class Junction:
 
 
 def _agreement(after, index, route) -> int:
-    """How many steps of a route a walk follows."""
-    starts = [k for k, step in enumerate(route) if step[0] == index[1]]
+    """How many steps of a route a walk follows after a lane.
+
+    The route counts on from the road of that lane: who drives all around a ring leaves it after the node where it
+    came in.
+    """
+    road = index[:2]
+    starts = [k + 1 for k, step in enumerate(route) if step == road] or [
+        k for k, s in enumerate(route) if s[0] == road[1]
+    ]
     rest = route[starts[0] :] if starts else ()
     apart = (k for k, (lane, step) in enumerate(zip(after, rest, strict=False)) if lane[:2] != step)
     return next(apart, min(len(after), len(rest)))
 
 
 @compiled
-def _changes_lane(roads, car):
-    """Is a car still on the lane beside the one that it heads for?"""
-    if car.on == car.lane or roads.lanes[car.on].road != roads.lanes[car.lane].road:
-        return False
-    return abs(local_coordinates(roads.lanes[car.lane], car.x, car.y)[1]) > _BETWEEN
+def _lane_left(roads, car, path, s, lateral):
+    """Lane that a car has not left yet for the one that it heads for, -1 = none.
+
+    Args:
+      path: one that it may take; s, lateral: where on that it is [m].
+    """
+    if car.on != car.lane and roads.lanes[car.on].road == roads.lanes[car.lane].road and abs(lateral) > _BETWEEN:
+        return car.on
+    paths, half_length, half_width = roads.paths, 0.5 * car.length, 0.5 * car.width
+    box = paths.swept[path, cell_of(s, paths.cells[path])]
+    if reach_beyond(box, car.x, car.y, car.heading, half_length, half_width)[1] <= 0.0:
+        return -1
+    for lane in range(len(roads.lanes)):
+        if lane != car.lane and roads.beside[car.lane] >> lane & 1:
+            p = roads.alongside[path, lane]
+            i = cell_of(_along(roads, p, lane, car), paths.cells[p])
+            if reaches_into(paths.swept[p, i], car.x, car.y, car.heading, half_length, half_width):
+                return lane
+    return -1
+
+
+@compiled
+def _along(roads, path, lane, car):
+    """Arc length of a car on a path, by its place beside one of its lanes [m]."""
+    return roads.paths.offset[path, lane] + local_coordinates(roads.lanes[lane], car.x, car.y)[0]
 
 
 @compiled
@@ -178,13 +230,17 @@ def track_of(roads, car, path):
     """
     if path < 0 or np.isnan(roads.paths.offset[path, car.lane]):
         path = roads.choices[car.choice, 0]
-    s, _ = local_coordinates(roads.lanes[car.lane], car.x, car.y)
+    s, lateral = local_coordinates(roads.lanes[car.lane], car.x, car.y)
     s += roads.paths.offset[path, car.lane]
-    beside, shift = -1, 0.0
-    if _changes_lane(roads, car):
-        beside = roads.choices[roads.through[car.on], 0]
-        shift = roads.paths.offset[beside, car.on] + local_coordinates(roads.lanes[car.on], car.x, car.y)[0] - s
-    return Track(path, s, car.speed, 0.5 * car.length, beside, shift)
+    left = _lane_left(roads, car, path, s, lateral)
+    if left < 0:
+        return Track(path, s, car.speed, 0.5 * car.length, -1, 0.0, 0.0, 0.0)
+    beside = roads.alongside[path, left]
+    shift = _along(roads, beside, left, car) - s
+    to_clear = max(abs(lateral), _CLEAR)
+    after = _DECAY * np.log(to_clear / _CLEAR) + _TURN_TIME
+    at = s + _SLANT * (to_clear - _CLEAR) + _TURN_LENGTH
+    return Track(path, s, car.speed, 0.5 * car.length, beside, shift, after, at)
 
 
 @compiled
@@ -217,9 +273,12 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
                 if _fits(roads.lanes[car.lane], car, _BEYOND_KNOWN, _OFF_KNOWN, _TURNED_KNOWN):
                     count = _add(roads, track, car.lane, car.choice, i, car, v_cap, threats, count)
                     samples[i].lanes = 1 << car.lane
-                if _changes_lane(roads, car):
-                    count = _add(roads, track, car.on, roads.through[car.on], i, car, v_cap, threats, count)
-                    samples[i].lanes |= 1 << car.on
+                s, lateral = local_coordinates(roads.lanes[car.lane], car.x, car.y)
+                path = roads.choices[car.choice, 0]
+                left = _lane_left(roads, car, path, s + roads.paths.offset[path, car.lane], lateral)
+                if left >= 0:
+                    count = _add(roads, track, left, roads.through[left], i, car, v_cap, threats, count)
+                    samples[i].lanes |= 1 << left
             else:
                 lanes = _fitting(roads, car)
                 if memory[i].age > 0 and lanes & memory[i].reachable != 0:

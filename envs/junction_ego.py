@@ -20,7 +20,7 @@ from shield.junction import (
     junction_frame,
 )
 from shield.kinematics import stopping_distance
-from shield.plans import GO, STOP, THREAT, Scene
+from shield.plans import GO, NEVER, STOP, THREAT, Scene
 from shield.signals import keep_right, may_pass
 
 PLAN_NAMES = {0: "inherited", STOP: "stop", GO: "go", STOP | GO: "both"}
@@ -193,6 +193,7 @@ class JunctionEgo(ShieldedEgo):
         line = self.room[count]
         line["user"] = line["path"] = -1
         line["from_cell"], line["to_cell"] = cell, roads.paths.cells[track.path]
+        line["from_cell_beside"], line["to_cell_beside"] = NEVER, -1
         return self.room[: count + 1]
 
     def _rank(self, road: SignalisedRoad, other, threat) -> None:

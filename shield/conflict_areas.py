@@ -56,11 +56,25 @@ def boxes_overlap(a, b, margin):
 @compiled
 def reach_beyond(box, x, y, heading, half_length, half_width):
     """How far a car reaches beyond a box: along and across it, negative = not at all [m]."""
+    along, across, half_along, half_across = _seen_from(box, x, y, heading, half_length, half_width)
+    return along + half_along - box[HALF_LENGTH], across + half_across - box[HALF_WIDTH]
+
+
+@compiled
+def reaches_into(box, x, y, heading, half_length, half_width):
+    """Does the smallest rectangle around a car that is aligned with a box overlap it?"""
+    along, across, half_along, half_across = _seen_from(box, x, y, heading, half_length, half_width)
+    return along - half_along < box[HALF_LENGTH] and across - half_across < box[HALF_WIDTH]
+
+
+@compiled
+def _seen_from(box, x, y, heading, half_length, half_width):
+    """Distance of a car's centre from that of a box, along and across it, and the car's half extents likewise [m]."""
     dx, dy, cos, sin = x - box[X], y - box[Y], np.cos(heading), np.sin(heading)
     turn_cos, turn_sin = abs(cos * box[COS] + sin * box[SIN]), abs(sin * box[COS] - cos * box[SIN])
-    along = abs(dx * box[COS] + dy * box[SIN]) + half_length * turn_cos + half_width * turn_sin
-    across = abs(dy * box[COS] - dx * box[SIN]) + half_length * turn_sin + half_width * turn_cos
-    return along - box[HALF_LENGTH], across - box[HALF_WIDTH]
+    half_along = half_length * turn_cos + half_width * turn_sin
+    half_across = half_length * turn_sin + half_width * turn_cos
+    return abs(dx * box[COS] + dy * box[SIN]), abs(dy * box[COS] - dx * box[SIN]), half_along, half_across
 
 
 @compiled_for_arrays

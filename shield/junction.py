@@ -494,10 +494,18 @@ def _ttc(scene):
 
 @compiled
 def block(paths, track, box, threat):
-    """Fill in which cells of the ego's path ahead an obstacle is in the way of."""
-    from_cell, to_cell = NEVER, -1
-    path = track.path
-    for i in range(cell_of(track.s, paths.cells[path]), paths.cells[path]):
+    """Fill in which cells of the ego's path ahead, and of the lane that it is leaving, an obstacle is in the way of."""
+    threat.from_cell, threat.to_cell = _blocked(paths, track.path, track.s, box)
+    threat.from_cell_beside, threat.to_cell_beside = NEVER, -1
+    if track.beside >= 0:
+        threat.from_cell_beside, threat.to_cell_beside = _blocked(paths, track.beside, track.s + track.shift, box)
+
+
+@compiled
+def _blocked(paths, path, s, box):
+    """First and last cell of a path from `s` on that overlap an obstacle; `NEVER` and -1 if none does."""
+    first, last = NEVER, -1
+    for i in range(cell_of(s, paths.cells[path]), paths.cells[path]):
         if boxes_overlap(paths.boxes[path, i], box, 0.0):
-            from_cell, to_cell = min(from_cell, i), i
-    threat.from_cell, threat.to_cell = from_cell, to_cell
+            first, last = min(first, i), i
+    return first, last

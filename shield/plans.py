@@ -41,7 +41,6 @@ _REVERSE = 1.0  # a car that reverses may go on for this long [s]
 _TAIL = 3  # frames between two moments at which a go plan may begin to brake
 _LONGEST = 10.0  # throttle phase of a plan, at most [s]
 _BODIES = 8.0  # cars that follow each other are in each other's way that far apart, margins included [m]
-_CHANGE = 1.0  # a lane change is over after that [s]
 _REST = 1e-9  # below this speed a plan has come to rest [m/s]
 
 # One way that a road user may take. SI units.
@@ -65,6 +64,8 @@ THREAT = np.dtype(
         ("joins", "i8"),  # cell of the ego's path from which on it may be on the ego's lane
         ("from_cell", "i8"),  # cells of the ego's path in the way of an obstacle
         ("to_cell", "i8"),
+        ("from_cell_beside", "i8"),  # likewise of the path of the lane that it is leaving
+        ("to_cell_beside", "i8"),
     ],
     align=True,
 )
@@ -77,8 +78,10 @@ class Track(NamedTuple):
     s: float  # arc length of the centre [m]
     v: float  # speed [m/s]
     half_length: float
-    beside: int  # path of the lane that it is leaving for this one, -1 = none
-    shift: float  # arc length on that path, less s [m]
+    beside: int = -1  # path of the lane that it has not left yet for this one, -1 = none
+    shift: float = 0.0  # arc length on that path, less s [m]
+    leaves_after: float = 0.0  # it has left that lane once it has driven for this long [s] ...
+    leaves_at: float = 0.0  # ... and is past this arc length [m]
 
 
 class Scene(NamedTuple):
@@ -212,17 +215,33 @@ def meets(scene, s, slack, threat, t, resting):
 
     With a `slack` [m], the ego may be that much further or less far than at `s`.
     """
-    paths, track = scene.paths, scene.track
-    first, last = cell_of(s - slack, paths.cells[track.path]), cell_of(s + slack, paths.cells[track.path])
+    track, other = scene.track, scene.other
+    leaves = track.beside >= 0 and (t <= track.leaves_after or s <= track.leaves_at)
     if threat.path < 0:
-        return threat.from_cell <= last and first <= threat.to_cell
-    low, high = nearest(threat, t, scene.other), np.inf if resting else farthest(threat, t, scene.other)
-    for i in range(first, last + 1):
-        if in_conflict(paths, track.path, i, threat.path, low, high):
+        return _overlaps(scene.paths, track.path, s, slack, threat.from_cell, threat.to_cell) or (
+            leaves
+            and _overlaps(
+                scene.paths, track.beside, s + track.shift, slack, threat.from_cell_beside, threat.to_cell_beside
+            )
+        )
+    low, high = nearest(threat, t, other), np.inf if resting else farthest(threat, t, other)
+    return _conflicts(scene.paths, track.path, s, slack, threat.path, low, high) or (
+        leaves and _conflicts(scene.paths, track.beside, s + track.shift, slack, threat.path, low, high)
+    )
+
+
+@inner_merged
+def _overlaps(paths, path, s, slack, from_cell, to_cell):
+    """Is the ego in one of these cells of a path?"""
+    return from_cell <= cell_of(s + slack, paths.cells[path]) and cell_of(s - slack, paths.cells[path]) <= to_cell
+
+
+@inner_merged
+def _conflicts(paths, path, s, slack, other_path, low, high):
+    """Is the ego, on a path, in the way of somebody between `low` and `high` on another [m]?"""
+    for i in range(cell_of(s - slack, paths.cells[path]), cell_of(s + slack, paths.cells[path]) + 1):
+        if in_conflict(paths, path, i, other_path, low, high):
             return True
-    if track.beside >= 0 and t <= _CHANGE:
-        i = cell_of(s + track.shift, paths.cells[track.beside])
-        return in_conflict(paths, track.beside, i, threat.path, low, high)
     return False
 
 
