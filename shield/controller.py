@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shield.command import Command
-from shield.compiled import compiled, inner, inner_merged
+from shield.compiled import compiled, inner, inner_merged, merged
 from shield.geometry import signed_gap
 from shield.pair import assess, leading_speed, least_margin, own_share, toward
 from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, remember
@@ -40,7 +40,7 @@ class Body(NamedTuple):
     curvature: float  # of the lane at the ego, positive turns right [1/m]
 
 
-@compiled
+@merged
 def shield_frame(ego, users, ego_before, users_before, memory, nominal, body, ego_params, other_params, rules, dt):
     """Restrict the ego's nominal command to what RSS permits on this frame.
 

@@ -143,7 +143,9 @@ def least_margin(ego, user, share_ego, ego_params, other_params, rules, dt):
 @inner_merged
 def _credit(v_front, rear, front):
     """The leader's own way to rest [m]; 0 if the cars may be closest before they stand."""
-    return stopping_distance(v_front, front.a_max_brake) if rear.a_min_brake <= front.a_max_brake else 0.0
+    if rear.a_min_brake > front.a_max_brake:
+        return 0.0
+    return stopping_distance(1.0, front.a_max_brake) * v_front**2  # the first factor is the same for all leaders
 
 
 @merged

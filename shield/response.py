@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, merged
+from shield.compiled import compiled, inner, merged
 from shield.kinematics import speed_envelope
 from shield.pair import assess
 
@@ -98,12 +98,16 @@ def remember(memory, pair, ego, user, dt):
     memory.skipped = False
 
 
-@compiled
+@merged
 def catch_up(memory, ego_before, user_before, ego_params, other_params, rules, dt):
     """Take in the last sample, if it was skipped, in place. It is the threshold of a danger that begins now."""
     if memory.skipped:
-        pair = assess(ego_before, user_before, ego_params, other_params, rules, dt)
-        remember(memory, pair, ego_before, user_before, dt)
+        _take_in(memory, ego_before, user_before, ego_params, other_params, rules, dt)
+
+
+@inner
+def _take_in(memory, ego, user, ego_params, other_params, rules, dt):
+    remember(memory, assess(ego, user, ego_params, other_params, rules, dt), ego, user, dt)
 
 
 @compiled

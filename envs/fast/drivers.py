@@ -180,43 +180,55 @@ def _lane_on(road, lane_id, k, x, y, net, lanes):
 def _drive_in_traffic(cars, i, n, changing, net, lanes, sight, idm):
     car = cars[i]
     follow_road(cars, i, net, lanes, sight)
-    if car.changes_lane:
-        _change_lane(cars, i, n, changing, net, lanes, sight, idm)
-    car.steering = steer(cars, i, lanes, sight)
+    # who changes its mind asks for accelerations more than once, on which only the car ahead differs
+    free = idm.comfort_acc_max * (1 - _speed_ratio(car, lanes) ** car.delta)
     ahead = car_ahead(car.lane, i, n, net, lanes, sight)
-    a = idm_acceleration(cars, i, ahead, car.delta, lanes, sight.s, idm)
+    a = free - _interaction(cars, i, ahead, lanes, sight.s, idm)
+    if car.changes_lane:
+        _change_lane(cars, i, n, changing, free, a, net, lanes, sight, idm)
+    car.steering = steer(cars, i, lanes, sight)
     if car.lane != car.target_lane:
         ahead = car_ahead(car.target_lane, i, n, net, lanes, sight)
-        a = min(a, idm_acceleration(cars, i, ahead, car.delta, lanes, sight.s, idm))
+        a = min(a, free - _interaction(cars, i, ahead, lanes, sight.s, idm))
     car.acceleration = clip(a, -idm.acc_max, idm.acc_max)
 
 
-@compiled
-def idm_acceleration(cars, i, ahead, delta, lanes, s, idm):
-    """Acceleration of car `i` behind car `ahead` by the Intelligent Driver Model [m/s^2].
-
-    Args:
-      i: the follower, -1 = nobody.
-      ahead: the leader, -1 = free road.
-      delta: exponent of whoever asks.
-      lanes: `[L]` LANE.
-      s: `[L, N]` arc lengths.
-      idm: CONFIG, parameters of the traffic.
-    """
-    if i < 0 or cars[i].kind == OBSTACLE:
-        return 0.0
-    car = cars[i]
+@merged
+def _speed_ratio(car, lanes):
+    """Speed over the speed that a car wants on its lane."""
     target = 0.0 if car.kind == DIRECT else car.target_speed
     target = clip(target, 0.0, lanes[car.lane].speed_limit)
-    a = idm.comfort_acc_max * (1 - (max(car.speed, 0.0) / abs(not_zero(target))) ** delta)
-    if ahead >= 0:
-        there = s[car.lane, ahead]
-        if np.isnan(there):
-            there, _ = local_coordinates(lanes[car.lane], cars[ahead].x, cars[ahead].y)
-        gap = there - s[car.lane, i]
-        ratio = desired_gap(cars, i, ahead, idm) / not_zero(gap)
-        a -= idm.comfort_acc_max * (ratio * ratio)
-    return a
+    return max(car.speed, 0.0) / abs(not_zero(target))
+
+
+@compiled
+def _interaction(cars, i, ahead, lanes, s, idm):
+    """What car `ahead`, -1 = none, takes from the acceleration of car `i` on a free road (IDM) [m/s^2]."""
+    if ahead < 0:
+        return 0.0
+    car = cars[i]
+    there = s[car.lane, ahead]
+    if np.isnan(there):
+        there, _ = local_coordinates(lanes[car.lane], cars[ahead].x, cars[ahead].y)
+    gap = there - s[car.lane, i]
+    ratio = desired_gap(cars, i, ahead, idm) / not_zero(gap)
+    return idm.comfort_acc_max * (ratio * ratio)
+
+
+@compiled
+def _has_to_brake(cars, i, ahead, delta, lanes, s, idm):
+    """Would car `i`, -1 = none, brake harder behind car `ahead` than a change of lanes may impose on it?
+
+    `delta` is the exponent of whoever asks. The power is left out where the answer does not depend on it.
+    """
+    if i < 0 or cars[i].kind == OBSTACLE:
+        return -idm.max_braking_imposed > 0.0
+    taken, ratio = _interaction(cars, i, ahead, lanes, s, idm), _speed_ratio(cars[i], lanes)
+    if idm.comfort_acc_max - taken < -idm.max_braking_imposed:
+        return True
+    if ratio <= 1.0 and -taken >= -idm.max_braking_imposed:
+        return False
+    return idm.comfort_acc_max * (1 - ratio**delta) - taken < -idm.max_braking_imposed
 
 
 @compiled
@@ -234,8 +246,13 @@ def desired_gap(cars, i, ahead, idm):
 
 
 @merged
-def _change_lane(cars, i, n, changing, net, lanes, sight, idm):
-    """Start a lane change, or give one up."""
+def _change_lane(cars, i, n, changing, free, a, net, lanes, sight, idm):
+    """Start a lane change, or give one up.
+
+    Args:
+      changing: how many cars change lanes.
+      free: the car's acceleration on a free road, a: on its lane [m/s^2].
+    """
     car = cars[i]
     if car.lane != car.target_lane:
         if lanes[car.lane].road == lanes[car.target_lane].road:
@@ -251,7 +268,7 @@ def _change_lane(cars, i, n, changing, net, lanes, sight, idm):
             continue
         if not is_reachable(lanes[k], sight.s[k, i], sight.lateral[k, i]) or abs(car.speed) < 1:
             continue
-        if _is_change_worthwhile(cars, i, k, n, net, lanes, sight, idm):
+        if _is_change_worthwhile(cars, i, k, n, free, a, net, lanes, sight, idm):
             car.target_lane = k
 
 
@@ -273,18 +290,21 @@ def _give_way(cars, i, changing, sight, idm):
 
 
 @compiled
-def _is_change_worthwhile(cars, i, k, n, net, lanes, sight, idm):
-    """MOBIL for drivers without politeness: does a change to lane `k` help, and harm nobody?"""
+def _is_change_worthwhile(cars, i, k, n, free, a, net, lanes, sight, idm):
+    """MOBIL for drivers without politeness: does a change to lane `k` help, and harm nobody?
+
+    `free` and `a` as in `_change_lane`. Most changes do not help, so that is asked first.
+    """
     car = cars[i]
     ahead = car_ahead(k, i, n, net, lanes, sight)
-    behind = car_behind(k, i, n, net, lanes, sight)
-    if idm_acceleration(cars, behind, i, car.delta, lanes, sight.s, idm) < -idm.max_braking_imposed:
-        return False
-    a = idm_acceleration(cars, i, ahead, car.delta, lanes, sight.s, idm)
+    there = free - _interaction(cars, i, ahead, lanes, sight.s, idm)
+    helps = there - a >= idm.min_acc_gain
     if car.route >= 0 and car.route_step < route_length(net, car.route):
         lane_id = net.route_lanes[car.route, car.route_step]
         if lane_id >= 0:
             here = lanes[car.target_lane].id
-            return np.sign(lanes[k].id - here) == np.sign(lane_id - here) and a >= -idm.max_braking_imposed
-    ahead = car_ahead(car.lane, i, n, net, lanes, sight)
-    return a - idm_acceleration(cars, i, ahead, car.delta, lanes, sight.s, idm) >= idm.min_acc_gain
+            helps = np.sign(lanes[k].id - here) == np.sign(lane_id - here) and there >= -idm.max_braking_imposed
+    if not helps:
+        return False
+    behind = car_behind(k, i, n, net, lanes, sight)
+    return not _has_to_brake(cars, behind, i, car.delta, lanes, sight.s, idm)

@@ -90,14 +90,7 @@ def compile_ways(network, net: Network) -> Ways:
 def _choices(junction: Junction, network, net: Network) -> np.ndarray:
     ways = [(origin, end) for origin, ends in network.graph.items() for end in ends]
     routes = [[ways[road] for road in roads if road >= 0] for roads in net.route_roads]
-    return np.array(
-        [[junction.choice(index, _rest(route, index)) for index in network.lanes_dict()] for route in [*routes, []]]
-    )
-
-
-def _rest(route: list, index: tuple) -> list:
-    """A route from a lane on: who drives around a ring comes twice where the route begins."""
-    return route[route.index(index[:2]) :] if index[:2] in route else route
+    return np.array([[junction.choice(index, route) for index in network.lanes_dict()] for route in [*routes, []]])
 
 
 def no_lane_frames() -> LaneFrames:
@@ -185,7 +178,7 @@ def start_tally(step):
     step.partner, step.response = -1, 0
 
 
-@compiled
+@merged
 def watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step):
     """Restrict the ego's command on one frame, unless it has had its contact.
 
@@ -207,7 +200,7 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, 
         _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step)
 
 
-@compiled
+@merged
 def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step):
     """Defs. 1-10, along the lane of the ego."""
     car, past = cars[episode.ego], distances.past
@@ -235,7 +228,9 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         settings.dt,
     )
     command = report.command if settings.overrides else wish
-    pairs, broken = judge_frame(ego, users, memory, command, curvature, settings.ego, settings.other, settings.dt)
+    pairs = broken = 0
+    if report.dangerous:
+        pairs, broken = judge_frame(ego, users, memory, command, curvature, settings.ego, settings.other, settings.dt)
     steered = steering
     if command.slip != wish.slip:
         steered = np.arctan(2.0 * np.tan(command.slip))
@@ -292,7 +287,7 @@ def _count(episode, step, report, pairs, broken, overrides):
     episode.min_ttc = min(episode.min_ttc, report.ttc)
 
 
-@compiled
+@merged
 def refuse_lane_change(before, cars, episode, sight, plans, settings):
     """Take back a lane change of this decision that leaves no plan; `before` is the lane the ego headed for."""
     episode.refused = False
@@ -363,7 +358,7 @@ def _car_of(user, episode):
     return user if user < episode.ego else user + 1
 
 
-@compiled
+@merged
 def _sense(cars, episode, lanes, sight, distances, watch, settings):
     """Take in everybody in the ego's lane frame, the ego last; returns the lane's curvature."""
     n, ego, frames, past = episode.cars, cars[episode.ego], distances.frames, distances.past
@@ -411,7 +406,7 @@ def _in_own_lane(k, car, ego, lanes, sight):
     return along and abs(lateral) <= (lane.width - car.width) / 2
 
 
-@compiled
+@merged
 def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
     """Has the ego touched somebody, or is it about to? Judged at the first such sample."""
     ego = cars[episode.ego]

@@ -224,7 +224,8 @@ def distance(lane, s, lateral):
 @compiled
 def is_on_lane(lane, s, lateral, margin):
     """Is a point in lane coordinates on the lane, or nearer to it than `margin` [m]?"""
-    return abs(lateral) <= lane.width / 2 + margin and -CAR_LENGTH <= s < lane.length + CAR_LENGTH
+    # without branches: which of several lanes a car is on cannot be foretold
+    return (abs(lateral) <= lane.width / 2 + margin) & (s >= -CAR_LENGTH) & (s < lane.length + CAR_LENGTH)
 
 
 @compiled

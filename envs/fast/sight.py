@@ -81,17 +81,26 @@ def project(cars, n, lanes, sight):
 def update_lanes(cars, n, lanes, sight):
     """Put every vehicle on the lane that is nearest in position and heading."""
     for i in range(n):
-        best, nearest = np.inf, 0
-        heading = cars[i].heading
+        car = cars[i]
+        bound = _far_from(car, i, car.lane, lanes, sight)
+        near = 0
         for k in range(len(lanes)):
-            lane = lanes[k]
-            s = sight.s[k, i]
-            far = distance(lane, s, sight.lateral[k, i])
-            if far < best:  # the angle only adds to it
-                far += abs(wrap_to_pi(heading - heading_at(lane, s)))
-                if far < best:
-                    best, nearest = far, k
-        cars[i].lane = nearest
+            near += distance(lanes[k], sight.s[k, i], sight.lateral[k, i]) <= bound  # the angle would only add to it
+        if near == 1:
+            continue
+        best, nearest = np.inf, 0
+        for k in range(len(lanes)):
+            far = _far_from(car, i, k, lanes, sight)
+            if far < best:
+                best, nearest = far, k
+        car.lane = nearest
+
+
+@merged
+def _far_from(car, i, k, lanes, sight):
+    """How far a car is from lane `k` in position [m] and heading [rad], added up."""
+    lane, s = lanes[k], sight.s[k, i]
+    return distance(lane, s, sight.lateral[k, i]) + abs(wrap_to_pi(car.heading - heading_at(lane, s)))
 
 
 @compiled
@@ -167,21 +176,22 @@ def line_up(n, lanes, order, sight):
     """Sort the cars on each lane by arc length, ties by index."""
     for k in range(len(lanes)):
         lane = lanes[k]
-        s, members = sight.s[k], sight.members[k]
+        s, lateral, members, rank = sight.s[k], sight.lateral[k], sight.members[k], sight.rank[k]
+        for i in range(n):
+            rank[i] = 0 if is_on_lane(lane, s[i], lateral[i], 1.0) else -1
         count = 0
-        for a in range(n):
-            i = order[a]
-            if is_on_lane(lane, s[i], sight.lateral[k, i], 1.0):
-                b = count - 1
-                while b >= 0 and (s[members[b]] > s[i] or (s[members[b]] == s[i] and members[b] > i)):
-                    members[b + 1] = members[b]
-                    b -= 1
-                members[b + 1] = i
-                count += 1
-            else:
-                sight.rank[k, i] = -1
+        for a in range(n):  # without branches: which cars are on it cannot be foretold
+            members[count] = order[a]
+            count += rank[order[a]] + 1
+        for a in range(1, count):  # nearly in order already
+            i = members[a]
+            b = a - 1
+            while b >= 0 and (s[members[b]] > s[i] or (s[members[b]] == s[i] and members[b] > i)):
+                members[b + 1] = members[b]
+                b -= 1
+            members[b + 1] = i
         for b in range(count):
-            sight.rank[k, members[b]] = b
+            rank[members[b]] = b
         sight.crowd[k] = count
 
 
