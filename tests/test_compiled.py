@@ -1,7 +1,12 @@
 """How functions are compiled."""
 
+from pathlib import Path
+
 import pytest
 
+import shield
+from envs.fast.compiled import sources
+from envs.fast.engine import run
 from envs.fast.floats import norm
 from shield.compiled import inner, inner_merged
 from shield.plans import step
@@ -21,3 +26,21 @@ def _thrice(x):
 def test_functions_for_compiled_callers_say_so(function):
     with pytest.raises(TypeError, match=f"{function.py_func.__name__} can only be called from compiled code"):
         function(1.0)
+
+
+def _parts(dispatcher, found):
+    """All compiled functions that one is made of."""
+    function = dispatcher.py_func
+    if function not in found:
+        found.add(function)
+        for name in function.__code__.co_names:
+            part = function.__globals__.get(name)
+            if hasattr(part, "py_func"):
+                _parts(part, found)
+    return found
+
+
+def test_a_change_in_any_file_that_the_kernel_is_made_of_compiles_it_anew():
+    files = {Path(function.__code__.co_filename) for function in _parts(run, set())}
+    assert {file.name for file in files} >= {"engine.py", "guard.py", "intent.py", "plans.py"}
+    assert files <= {*sources(), *Path(shield.__file__).parent.glob("*.py")}

@@ -40,12 +40,16 @@ def merged(function):
 def kernel(function):
     """Compile an entry point that releases the interpreter lock, with a cache on disk.
 
-    As in `shield.compiled`, any change in what the kernel is made of compiles it anew.
+    As in `shield.compiled`, any change in what the kernel may be made of compiles it anew.
     """
     dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **_inner)(function)
-    here = Path(__file__).parent
-    dispatcher._cache._cache_file._source_stamp = fingerprint(*here.glob("*.py"), here.parent / "highway.py")
+    dispatcher._cache._cache_file._source_stamp = fingerprint(*sources())
     return dispatcher
+
+
+def sources() -> list[Path]:
+    """Files that the kernel may be made of, beside those of `shield/`."""
+    return sorted(Path(__file__).parents[1].rglob("*.py"))
 
 
 @contextmanager
