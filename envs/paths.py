@@ -134,7 +134,7 @@ def _joins(lane, offset) -> np.ndarray:
     """`Paths.joins`."""
     shared = ~np.isnan(offset[:, lane]).swapaxes(0, 1) & (lane >= 0)[:, None]
     cell = np.where(shared, np.arange(lane.shape[1]), FAR).astype(np.int32)
-    return np.minimum.accumulate(cell[..., ::-1], axis=-1)[..., ::-1]
+    return np.ascontiguousarray(np.minimum.accumulate(cell[..., ::-1], axis=-1)[..., ::-1])
 
 
 def _starts(lanes, way) -> np.ndarray:

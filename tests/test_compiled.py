@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+import numba
 import pytest
 
+import envs
 import shield
 from envs.fast.compiled import sources
 from envs.fast.engine import run
@@ -44,3 +46,10 @@ def test_a_change_in_any_file_that_the_kernel_is_made_of_compiles_it_anew():
     files = {Path(function.__code__.co_filename) for function in _parts(run, set())}
     assert {file.name for file in files} >= {"engine.py", "guard.py", "intent.py", "plans.py"}
     assert files <= {*sources(), *Path(shield.__file__).parent.glob("*.py")}
+
+
+@pytest.mark.parametrize("env_id", ["highway-fast-v0", "intersection-v0", "roundabout-v0"])
+def test_one_kernel_runs_with_the_shield_and_without(env_id):
+    shielded, bare = (envs.make_vec(env_id, 2, shield=mode).engine for mode in ("override", None))
+    for part in ("world", "batch", "film", "settings"):
+        assert numba.typeof(getattr(shielded, part)) == numba.typeof(getattr(bare, part)), part
