@@ -23,8 +23,9 @@ _BEYOND = 3.0  # how far after its end, and before its start or where the lane b
 _OFF_KNOWN, _TURNED_KNOWN, _BEYOND_KNOWN = 4.0, 1.4, 12.0  # likewise for a lane that it is known to head for
 _BETWEEN = 1.0  # further from the middle of the lane it heads for, a car is on the one beside it too [m]
 # Nobody sweeps the lane that it leaves any more when it is `_CLEAR` from the middle of the one that it heads for
-# [m]. highway-env's drivers steer at up to 45 deg, and come nearer by a factor of e in `_DECAY` [s]; to turn the
-# wheels and to straighten up takes them `_TURN_TIME` [s] and `_TURN_LENGTH` [m].
+# [m]. highway-env's drivers need at most `_SLANT` [m] along the lane for 1 m across when they are slow, and come nearer
+# by a factor of e in `_DECAY` [s] when they are fast; to turn the wheels and to straighten up takes them `_TURN_TIME`
+# [s] and `_TURN_LENGTH` [m].
 _CLEAR, _DECAY, _TURN_TIME, _SLANT, _TURN_LENGTH = 1.5, 0.6, 0.4, 2.0, 3.0
 _ROLL = 1.05  # a wreck rolls to rest in this time at its speed [s]
 
