@@ -1,15 +1,16 @@
 """The engine: batches of environments, one compiled kernel, Python threads.
 
-The kernel advances a range of environments and releases the interpreter lock, so threads each take a
-share of the batch. Environments do not see each other: results do not depend on the shares.
+The kernel advances a range of environments and releases the interpreter lock, so threads work on one batch
+side by side. Environments do not see each other: results do not depend on who advances which.
 """
 
 import sys
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from threading import Timer
 from typing import NamedTuple
 
 import numpy as np
+from numba import typeof
 
 from envs.fast.compiled import compiled, compiling_quickly, kernel, unfolded
 from envs.fast.config import Scenario
@@ -44,6 +45,7 @@ from envs.fast.rewards import NO_ACTION, is_terminated, is_truncated, rate
 from envs.fast.scenes import make_scene
 from envs.fast.sight import make_sight, sort_along_x
 from envs.fast.state import CAR, EPISODE, STEP
+from envs.fast.threads import Crew
 from envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from envs.highway import PLANS, Settings
 from envs.wrapper import scheme_of
@@ -326,8 +328,8 @@ class Engine:
         self.film = Film(np.full(num_envs, -1, np.int64), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
         self._seen: np.ndarray | None = None  # last observations
         self._size = int(np.prod(scenario.observation_space.shape or 1))
-        self._shares = np.linspace(0, num_envs, threads + 1).astype(int)
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._crew = Crew(threads)
+        self._kernel: Callable[..., None] | None = None  # `run`, compiled for this engine
         config = scenario.config[0]
         sizes = len(scenario.network.lanes), n, config["speeds"], config["lanes"], config["times"]
         self._sights = [make_sight(*sizes) for _ in range(threads)]
@@ -361,8 +363,10 @@ class Engine:
           commands: `[E, 2]` acceleration [m/s^2] and steering [rad].
         """
         e = self.num_envs
-        actions = np.full(e, -1, np.int64) if actions is None else actions
+        actions = np.full(e, -1) if actions is None else actions
         commands = np.zeros((e, 2)) if commands is None else commands
+        # compiled for these types and no others
+        actions, commands = np.ascontiguousarray(actions, np.int64), np.ascontiguousarray(commands, np.float64)
         return self._run(Inputs(actions, commands, np.full(e, DECIDE, np.int8)))
 
     def _run(self, inputs: Inputs) -> Outputs:
@@ -378,14 +382,10 @@ class Engine:
         )
         rules = (self.settings, self.mode, self.penalty, self.autoreset)
         common = (self.world, self.batch, inputs, outputs, self.film, self._watch, *rules)
-        if not run.signatures:
-            _warm_up(self._sights[0], *common)
-        if self._pool is None:
-            run(0, e, self._sights[0], *common)
-        else:
-            shares = zip(self._shares[:-1], self._shares[1:], self._sights, strict=True)
-            for done in [self._pool.submit(run, *share, *common) for share in shares]:
-                done.result()
+        if self._kernel is None:
+            self._kernel = _specialise(self._sights[0], *common)
+        advance = self._kernel
+        self._crew.work(e, lambda thread, first, last: advance(first, last, self._sights[thread], *common))
         if self.batch.episodes["overflow"].any():
             self.batch.episodes["overflow"] = False
             raise OverflowError(
@@ -397,16 +397,21 @@ class Engine:
 
     def close(self) -> None:
         """Give the threads back."""
-        if self._pool is not None:
-            self._pool.shutdown()
+        self._crew.close()
 
 
-def _warm_up(*arguments) -> None:
-    """Compile the kernel, or load it from numba's cache; says so if that takes long."""
+def _specialise(*arguments) -> Callable[..., None]:
+    """`run`, compiled for these arguments or loaded from numba's cache; says so if that takes long.
+
+    It skips what numba does on every call to find out the types of its arguments, a hundred arrays.
+    """
     notice = Timer(
         _PATIENCE, lambda: print("compiling the fast engine; numba keeps the result for later runs", file=sys.stderr)
     )
     notice.start()
-    with compiling_quickly():
-        run(0, 0, *arguments)
-    notice.cancel()
+    try:
+        with compiling_quickly():
+            run(0, 0, *arguments)
+    finally:
+        notice.cancel()
+    return run.get_overload(tuple(typeof(argument) for argument in (0, 0, *arguments)))
