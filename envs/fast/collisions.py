@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled
+from envs.fast.compiled import compiled, merged
 from envs.fast.floats import dot, norm
 from envs.fast.state import OBSTACLE
 
 
-@compiled
+@merged
 def collide(cars, episode, order, sight, dt):
     """Find all collisions of this frame, in the order of (first, second) index, and mark the cars.
 
@@ -38,7 +38,7 @@ def collide(cars, episode, order, sight, dt):
                 _insert(sight.pairs, found, first * n + second)
                 found += 1
     for m in range(found):
-        _collide_pair(cars, sight.pairs[m] // n, sight.pairs[m] % n, sight, dt)
+        _collide_pair(cars, sight.pairs[m] // n, sight.pairs[m] % n, sight.corners, dt)
 
 
 @compiled
@@ -51,9 +51,9 @@ def _insert(values, count, value):
 
 
 @compiled
-def _collide_pair(cars, i, j, sight, dt):
+def _collide_pair(cars, i, j, corners, dt):
     first, second = cars[i], cars[j]
-    touches, will_touch, x, y = overlap(first, second, sight.corners, dt)
+    touches, will_touch, x, y = overlap(first, second, corners, dt)
     if will_touch:
         if second.kind == OBSTACLE:
             _hit(first, x, y)

@@ -19,7 +19,7 @@ LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)  # as in `DiscreteMetaAct
 _KP_ACCELERATION = ControlledVehicle.KP_A  # [1/s]
 
 
-@compiled
+@merged
 def list_changing(cars, n, sight):
     """Fill `sight.changing` with the cars that head for another lane; returns how many."""
     changing = np.int64(0)
@@ -30,7 +30,7 @@ def list_changing(cars, n, sight):
     return changing
 
 
-@compiled
+@merged
 def decide(cars, first, last, n, changing, net, lanes, sight, idm):
     """Commands of the vehicles `first` to `last` - 1 for one frame.
 
@@ -272,7 +272,7 @@ def _change_lane(cars, i, n, changing, free, a, net, lanes, sight, idm):
             car.target_lane = k
 
 
-@compiled
+@merged
 def _give_way(cars, i, changing, sight, idm):
     """Abort a lane change if somebody close ahead is already changing to the same lane."""
     car = cars[i]
@@ -289,7 +289,7 @@ def _give_way(cars, i, changing, sight, idm):
             return
 
 
-@compiled
+@merged
 def _is_change_worthwhile(cars, i, k, n, free, a, net, lanes, sight, idm):
     """MOBIL for drivers without politeness: does a change to lane `k` help, and harm nobody?
 

@@ -141,7 +141,7 @@ def _restart(cars, episode, order, world, sight, distances, plans, watch, mode, 
     config, lanes = world.config[0], world.network.lanes
     _populate(cars, episode, order, world, sight, world.flow)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
-    survey(cars, episode, lanes, sight, world.flow)
+    survey(cars, episode, world.network, sight, world.flow)
     sort_along_x(cars, episode.cars, order)
     start_watch(episode, distances, plans, watch)
     start_tally(step)
@@ -192,7 +192,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, watch, set
     config, net, flow = world.config[0], world.network, world.flow
     lanes = net.lanes
     ego = cars[episode.ego]
-    survey(cars, episode, lanes, sight, flow)
+    survey(cars, episode, net, sight, flow)
     start_tally(step)
     had_contact = episode.blame != 0
     for frame in range(config.frames):
@@ -207,10 +207,12 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, watch, set
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
         changing = look_around(cars, episode, order, net, sight, flow)
-        changing = think(cars, episode, 0, episode.ego + 1, changing, net, sight, config)
-        if mode != OFF:
-            watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step)
-        think(cars, episode, episode.ego + 1, episode.vehicles, changing, net, sight, config)
+        first, last = 0, episode.ego + 1
+        for _ in range(2):  # those up to the ego, then those after it; a loop, lest the kernel contain it twice
+            changing = think(cars, episode, first, last, changing, net, sight, config)
+            if first == 0 and mode != OFF:
+                watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step)
+            first, last = last, episode.vehicles
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
             for i in range(len(cars)):
@@ -236,7 +238,7 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
         outputs.rewards[e] = 0.0
         outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
-            survey(cars, episode, lanes, sight, world.flow)
+            survey(cars, episode, world.network, sight, world.flow)
             _see(cars, episode, world, sight, observation)
             _report(cars, episode, mode, 0.0, step)
             continue

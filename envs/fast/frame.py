@@ -5,47 +5,46 @@ without what only the other needs.
 """
 
 from envs.fast.collisions import collide
-from envs.fast.compiled import compiled
+from envs.fast.compiled import merged
 from envs.fast.drivers import decide, list_changing
 from envs.fast.motion import move
 from envs.fast.regulation import regulate
 from envs.fast.sight import line_up, place, project, sort_along_x, update_lanes
 
 
-@compiled
-def survey(cars, episode, lanes, sight, flow):
+@merged
+def survey(cars, episode, net, sight, flow):
     """Find out where everybody is. Nobody has moved since their lanes were found."""
     if flow is None:
-        project(cars, episode.cars, lanes, sight)
+        project(cars, episode.cars, net, sight)
     else:
-        place(cars, episode.cars, lanes, sight)
+        place(cars, episode.cars, net.lanes, sight)
 
 
-@compiled
+@merged
 def look_around(cars, episode, order, net, sight, flow):
     """Get ready to `think`, after a survey; returns how many cars change lanes."""
     if flow is None:
-        line_up(episode.cars, net.lanes, order, sight)
+        line_up(episode.cars, net, order, sight)
     return list_changing(cars, episode.cars, sight)
 
 
-@compiled
+@merged
 def think(cars, episode, first, last, changing, net, sight, config):
     """Commands of the vehicles `first` to `last` - 1; returns how many cars change lanes then."""
     return decide(cars, first, last, episode.cars, changing, net, net.lanes, sight, config)
 
 
-@compiled
+@merged
 def act(cars, episode, order, net, sight, config, flow):
     """Carry the commands out, survey the result and find collisions."""
-    lanes = net.lanes
     if flow is not None:
         regulate(cars, episode, net, sight, config, flow[0])
     move(cars, episode.vehicles, config.dt, config.max_speed, config.min_speed)
     if flow is None:
-        project(cars, episode.cars, lanes, sight)
-        update_lanes(cars, episode.vehicles, lanes, sight)
+        project(cars, episode.cars, net, sight)
+        update_lanes(cars, episode.vehicles, net, sight)
     else:
-        place(cars, episode.cars, lanes, sight)
+        place(cars, episode.cars, net.lanes, sight)
     sort_along_x(cars, episode.cars, order)
     collide(cars, episode, order, sight, config.dt)

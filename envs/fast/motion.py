@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled
+from envs.fast.compiled import compiled, merged
 from envs.fast.state import DIRECT, TRAFFIC
 
 
@@ -13,7 +13,7 @@ def set_heading(car, heading):
     car.cos, car.sin = np.cos(heading), np.sin(heading)
 
 
-@compiled
+@merged
 def move(cars, n_vehicles, dt, max_speed, min_speed):
     """Advance all vehicles by one frame.
 

@@ -69,6 +69,7 @@ class Network(NamedTuple):
     route_roads: np.ndarray  # `[P, *]` roads of each planned route
     route_lanes: np.ndarray  # `[P, *]` lane id on each, -1 = any
     plans: np.ndarray  # `[L, D]` route from a lane to each of the destinations
+    spacing: float  # of lanes that all run side by side along the x-axis, from 0 on [m]; 0 = other roads
 
 
 def compile_network(network, connected: bool, destinations: tuple[str, ...] = (), lined_up: bool = True) -> Network:
@@ -119,7 +120,16 @@ def compile_network(network, connected: bool, destinations: tuple[str, ...] = ()
         _padded(route_roads, np.int64, -1),
         _padded(route_lanes, np.int64, -1),
         plans,
+        _spacing(lanes),
     )
+
+
+def _spacing(lanes: np.ndarray) -> float:
+    """`Network.spacing`. On such roads arc lengths are x and lateral offsets differences of y, to the last bit."""
+    along_x = (lanes["kind"] == STRAIGHT) & (lanes["x"] == 0) & (lanes["dx"] == 1) & (lanes["dy"] == 0)
+    if not along_x.all() or np.ptp(lanes["road"]) > 0 or np.ptp(lanes["length"]) > 0:
+        return 0.0
+    return float(min(np.diff(np.sort(lanes["y"])), default=np.inf))
 
 
 def _lane(lane, road: int, index) -> np.ndarray:

@@ -30,7 +30,7 @@ class Sight(NamedTuple):
     lateral: np.ndarray  # `[L, N]` signed offset [m]
     members: np.ndarray  # `[L, N]` cars on each lane, sorted by (arc length, index)
     crowd: np.ndarray  # `[L]` how many
-    rank: np.ndarray  # `[L, N]` place of a car among the members, -1 = not on the lane
+    rank: np.ndarray  # `[L, N]` place of a car among the members, or the one it would take; -1 = not known
     changing: np.ndarray  # `[N]` cars that head for another lane
     pairs: np.ndarray  # `[N (N - 1) / 2]` pairs that may collide
     corners: np.ndarray  # `[2, 4, 2]` of two boxes [m]
@@ -68,20 +68,29 @@ def make_sight(n_lanes, n, speeds, lanes, times):
     )
 
 
-@compiled
-def project(cars, n, lanes, sight):
+@merged
+def project(cars, n, net, sight):
     """Lane coordinates of all cars on all lanes."""
-    for k in range(len(lanes)):
-        lane = lanes[k]
+    if net.spacing > 0.0:
+        for i in range(n):
+            x, y = cars[i].x, cars[i].y
+            for k in range(len(net.lanes)):
+                sight.s[k, i], sight.lateral[k, i] = x, y - net.lanes[k].y
+        return
+    for k in range(len(net.lanes)):
+        lane = net.lanes[k]
         for i in range(n):
             sight.s[k, i], sight.lateral[k, i] = local_coordinates(lane, cars[i].x, cars[i].y)
 
 
-@compiled
-def update_lanes(cars, n, lanes, sight):
+@merged
+def update_lanes(cars, n, net, sight):
     """Put every vehicle on the lane that is nearest in position and heading."""
+    lanes = net.lanes
     for i in range(n):
         car = cars[i]
+        if 2.0 * abs(sight.lateral[car.lane, i]) + abs(car.heading) < net.spacing - 1e-6:
+            continue  # all other lanes are farther away in position alone
         bound = _far_from(car, i, car.lane, lanes, sight)
         near = 0
         for k in range(len(lanes)):
@@ -159,45 +168,68 @@ def locate(k, i, cars, lanes, sight):
         sight.s[k, i], sight.lateral[k, i] = local_coordinates(lanes[k], cars[i].x, cars[i].y)
 
 
-@compiled
+@merged
 def sort_along_x(cars, n, order):
-    """Keep `order` `[N]` sorted by x; it changes little from frame to frame."""
+    """Keep `order` `[N]` sorted by x, ties by index; it changes little from frame to frame."""
     for a in range(1, n):
         i = order[a]
         b = a - 1
-        while b >= 0 and cars[order[b]].x > cars[i].x:
+        while b >= 0 and (cars[order[b]].x > cars[i].x or (cars[order[b]].x == cars[i].x and order[b] > i)):
             order[b + 1] = order[b]
             b -= 1
         order[b + 1] = i
 
 
-@compiled
-def line_up(n, lanes, order, sight):
+@merged
+def line_up(n, net, order, sight):
     """Sort the cars on each lane by arc length, ties by index."""
-    for k in range(len(lanes)):
-        lane = lanes[k]
-        s, lateral, members, rank = sight.s[k], sight.lateral[k], sight.members[k], sight.rank[k]
-        for i in range(n):
-            rank[i] = 0 if is_on_lane(lane, s[i], lateral[i], 1.0) else -1
-        count = 0
-        for a in range(n):  # without branches: which cars are on it cannot be foretold
-            members[count] = order[a]
-            count += rank[order[a]] + 1
-        for a in range(1, count):  # nearly in order already
-            i = members[a]
-            b = a - 1
-            while b >= 0 and (s[members[b]] > s[i] or (s[members[b]] == s[i] and members[b] > i)):
-                members[b + 1] = members[b]
-                b -= 1
-            members[b + 1] = i
-        for b in range(count):
-            rank[members[b]] = b
-        sight.crowd[k] = count
+    for k in range(len(net.lanes)):
+        if net.spacing > 0.0:
+            sight.crowd[k] = _line_up_along_x(n, net.lanes[k], order, sight.lateral[k], sight.s[k], sight, k)
+        else:
+            sight.crowd[k] = _line_up_along(n, net.lanes[k], order, sight.lateral[k], sight.s[k], sight, k)
+
+
+# Which cars are on a lane cannot be foretold, so the next two have no branches that ask for it.
+
+
+@merged
+def _line_up_along_x(n, lane, order, lateral, s, sight, k):
+    """`line_up` on a lane along the x-axis; returns how many cars are on it."""
+    members, rank = sight.members[k], sight.rank[k]
+    count = 0
+    for a in range(n):
+        i = order[a]
+        members[count], rank[i] = i, count
+        count += is_on_lane(lane, s[i], lateral[i], 1.0)
+    return count
+
+
+@merged
+def _line_up_along(n, lane, order, lateral, s, sight, k):
+    """`line_up` on any lane; who is not on it gets no rank."""
+    members, rank = sight.members[k], sight.rank[k]
+    for i in range(n):
+        rank[i] = 0 if is_on_lane(lane, s[i], lateral[i], 1.0) else -1
+    count = 0
+    for a in range(n):
+        members[count] = order[a]
+        count += rank[order[a]] + 1
+    for a in range(1, count):  # nearly in order already
+        i = members[a]
+        b = a - 1
+        while b >= 0 and (s[members[b]] > s[i] or (s[members[b]] == s[i] and members[b] > i)):
+            members[b + 1] = members[b]
+            b -= 1
+        members[b + 1] = i
+    for b in range(count):
+        rank[members[b]] = b
+    return count
 
 
 @merged
 def _place(k, i, sight):
-    """First member of lane `k` with the arc length of car `i` or more; the car itself if it is on it."""
+    """Place of car `i` among the members of lane `k`, or the one that it would take."""
     place = sight.rank[k, i]
     if place >= 0:
         return place
@@ -219,7 +251,9 @@ def car_ahead(k, i, n, net, lanes, sight):
         return _car_ahead_connected(k, i, n, net, lanes, sight)
     s, members, count = sight.s[k], sight.members[k], sight.crowd[k]
     place = _place(k, i, sight)
-    ahead = place + 1 if sight.rank[k, i] >= 0 else place
+    ahead = place
+    if ahead < count and members[ahead] == i:
+        ahead += 1
     if ahead < count:
         while ahead + 1 < count and s[members[ahead + 1]] == s[members[ahead]]:
             ahead += 1

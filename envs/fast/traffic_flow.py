@@ -38,7 +38,7 @@ def open_intersection(cars, episode, order, net, sight, config, flow, target_spe
     for t in range(n - 1):
         _arrive(cars, episode, t * (80.0 / (n - 1)), 1.0, 1.0, 0.6, _ANYWHERE, net, config, flow[0])
     _renumber(cars, episode, order)
-    survey(cars, episode, lanes, sight, flow)
+    survey(cars, episode, net, sight, flow)
     for _ in range(flow[0].warm_up_frames):
         changing = look_around(cars, episode, order, net, sight, flow)
         think(cars, episode, 0, episode.vehicles, changing, net, sight, config)
