@@ -4,7 +4,9 @@ import numpy as np
 
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import dot, norm
-from envs.fast.state import OBSTACLE
+from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
+
+_LARGEST = np.hypot(CAR_LENGTH, CAR_WIDTH)  # diagonal of a road user [m]
 
 
 @merged
@@ -19,26 +21,43 @@ def collide(cars, episode, order, sight, dt):
       dt: length of a frame [s].
     """
     n = episode.cars
-    fastest = widest = 0.0
+    fastest, all_check = 0.0, True
     for i in range(n):
         fastest = max(fastest, cars[i].speed)
-        widest = max(widest, diagonal(cars[i]))
-    reach = widest + fastest * dt + 1e-6
+        all_check &= cars[i].checks
+    reach = _LARGEST + fastest * dt + 1e-6
     found = 0
     for a in range(n):
         i = order[a]
+        if not cars[i].checks:
+            continue
         for b in range(a + 1, n):
             j = order[b]
             if cars[j].x - cars[i].x > reach:
                 break
-            if abs(cars[j].y - cars[i].y) > reach or not (cars[i].checks or cars[j].checks):
-                continue
-            first, second = min(i, j), max(i, j)
-            if first < episode.vehicles and is_near(cars[first], cars[second], dt):
-                _insert(sight.pairs, found, first * n + second)
-                found += 1
+            found = _note_pair(cars, i, j, n, episode.vehicles, found, reach, sight.pairs, dt)
+        if all_check:
+            continue
+        for b in range(a - 1, -1, -1):
+            j = order[b]
+            if cars[i].x - cars[j].x > reach:
+                break
+            if not cars[j].checks:
+                found = _note_pair(cars, i, j, n, episode.vehicles, found, reach, sight.pairs, dt)
     for m in range(found):
         _collide_pair(cars, sight.pairs[m] // n, sight.pairs[m] % n, sight.corners, dt)
+
+
+@compiled
+def _note_pair(cars, i, j, n, vehicles, found, reach, pairs, dt):
+    """Add a pair to the `found` ones if the two are near each other; returns how many there are then."""
+    if abs(cars[j].y - cars[i].y) > reach:
+        return found
+    first, second = min(i, j), max(i, j)
+    if first < vehicles and is_near(cars[first], cars[second], dt):
+        _insert(pairs, found, first * n + second)
+        return found + 1
+    return found
 
 
 @compiled

@@ -40,6 +40,7 @@ CONFIG = np.dtype(
         ("acc_max", "f8"),  # [m/s^2]
         ("comfort_acc_max", "f8"),
         ("comfort_acc_min", "f8"),
+        ("gap_braking", "f8"),  # what speeds are divided by in the desired gap
         ("distance_wanted", "f8"),  # [m]
         ("time_wanted", "f8"),  # [s]
         ("min_acc_gain", "f8"),  # [m/s^2]
@@ -204,6 +205,7 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
     features, ranges, connected = _fill_observation(record, env)
     number = {index: i for i, index in enumerate(env.road.network.lanes_dict())}
     reward_names = _FILL_SCENE[scenario](record, given, env, number)
+    record["gap_braking"] = 2 * np.sqrt(-record["comfort_acc_max"] * record["comfort_acc_min"])
     network = compile_network(
         env.road.network,
         given["neighbour_vehicles_connected_lanes"],

@@ -12,7 +12,7 @@ from envs.fast.floats import clip, dot, not_zero
 from envs.fast.network import distance, is_after_end, is_reachable, local_coordinates, position
 from envs.fast.sight import car_ahead, car_behind, locate
 from envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
-from envs.fast.steering import steering_angle
+from envs.fast.steering import is_aligned, steering_angle
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)  # as in `DiscreteMetaAction.ACTIONS_ALL`
 
@@ -24,15 +24,16 @@ def list_changing(cars, n, sight):
     """Fill `sight.changing` with the cars that head for another lane; returns how many."""
     changing = np.int64(0)
     for i in range(n):
-        if cars[i].target_lane != cars[i].lane:
-            sight.changing[changing] = i
-            changing += 1
+        sight.changing[changing] = i
+        changing += cars[i].target_lane != cars[i].lane
     return changing
 
 
 @merged
 def decide(cars, first, last, n, changing, net, lanes, sight, idm):
     """Commands of the vehicles `first` to `last` - 1 for one frame.
+
+    In four passes, each with little to foretell for the processor. Only the third sees what others decided.
 
     Args:
       cars: `[N]` CAR.
@@ -46,23 +47,85 @@ def decide(cars, first, last, n, changing, net, lanes, sight, idm):
       `changing`, with those that have just begun.
     """
     for i in range(first, last):
-        car = cars[i]
-        if car.kind == TRAFFIC:
-            if not car.crashed:
-                settled = car.target_lane == car.lane
-                _drive_in_traffic(cars, i, n, changing, net, lanes, sight, idm)
-                if settled and car.target_lane != car.lane:
-                    sight.changing[changing] = i
-                    changing += 1
-        elif car.kind == META:
-            control(cars, i, net, lanes, sight)
+        if _is_in_traffic(cars[i]):
+            sight.free[i] = idm.comfort_acc_max * (1 - _speed_ratio(cars[i], lanes) ** cars[i].delta)
+    busy = _follow(cars, first, last, n, net, lanes, sight, idm)
+    changing = _change_lanes(cars, busy, n, changing, net, lanes, sight, idm)
+    _carry_out(cars, first, last, lanes, sight, idm)
     return changing
+
+
+@merged
+def _follow(cars, first, last, n, net, lanes, sight, idm):
+    """Accelerate behind the car ahead; returns how many may do more than that, listed in `sight.some`."""
+    busy = 0
+    for i in range(first, last):
+        car, k = cars[i], cars[i].target_lane
+        if _is_in_traffic(car):
+            locate(k, i, cars, lanes, sight)
+            ahead = car_ahead(car.lane, i, n, net, lanes, sight)
+            sight.wanted[i] = sight.free[i] - _interaction(cars, i, ahead, lanes, sight.s, idm)
+            sight.some[busy] = i
+            thinks = car.changes_lane & (idm.lane_change_delay < car.timer)
+            busy += thinks | (k != car.lane) | is_after_end(lanes[k], sight.s[k, i])
+        elif car.kind == META:
+            sight.some[busy] = i
+            busy += 1
+    return busy
+
+
+@merged
+def _change_lanes(cars, busy, n, changing, net, lanes, sight, idm):
+    """Follow roads, and begin, go on with or give up lane changes, one car after the other; returns `changing`."""
+    for b in range(busy):
+        i = sight.some[b]
+        car = cars[i]
+        settled = car.target_lane == car.lane
+        follow_road(cars, i, net, lanes, sight)
+        if car.kind == META:
+            sight.wanted[i] = _KP_ACCELERATION * (car.target_speed - car.speed)
+            continue
+        # who changes its mind asks for accelerations more than once, on which only the car ahead differs
+        free = sight.free[i]
+        if car.changes_lane:
+            _change_lane(cars, i, n, changing, free, sight.wanted[i], net, lanes, sight, idm)
+        if car.lane != car.target_lane:
+            ahead = car_ahead(car.target_lane, i, n, net, lanes, sight)
+            sight.wanted[i] = min(sight.wanted[i], free - _interaction(cars, i, ahead, lanes, sight.s, idm))
+            if settled:
+                sight.changing[changing] = i
+                changing += 1
+    return changing
+
+
+@merged
+def _carry_out(cars, first, last, lanes, sight, idm):
+    """Commands for what was decided."""
+    turning = 0
+    for i in range(first, last):
+        car, k = cars[i], cars[i].target_lane
+        in_traffic = _is_in_traffic(car)
+        if in_traffic or car.kind == META:
+            a = sight.wanted[i]
+            car.acceleration = clip(a, -idm.acc_max, idm.acc_max) if in_traffic else a
+            car.steering = 0.0
+            sight.some[turning] = i
+            turning += not is_aligned(lanes[k], sight.s[k, i], sight.lateral[k, i], car.heading, car.speed)
+    for b in range(turning):
+        i = sight.some[b]
+        cars[i].steering = steer(cars, i, lanes, sight)
+
+
+@merged
+def _is_in_traffic(car):
+    """Is it driven by IDM and MOBIL, and not a wreck?"""
+    return (car.kind == TRAFFIC) & (not car.crashed)
 
 
 # ---------------------------------------------------------------- the controlled vehicle
 
 
-@compiled
+@merged
 def take_meta_action(cars, i, action, net, lanes, sight, target_speeds):
     """Change the target speed or lane of the car, as `MDPVehicle.act` does with a label."""
     car = cars[i]
@@ -86,15 +149,6 @@ def speed_to_index(speed, target_speeds):
     last = len(target_speeds) - 1
     x = (speed - target_speeds[0]) / (target_speeds[last] - target_speeds[0])
     return int(clip(np.rint(x * last), 0, last))
-
-
-@merged
-def control(cars, i, net, lanes, sight):
-    """Follow the target lane at the target speed."""
-    car = cars[i]
-    follow_road(cars, i, net, lanes, sight)
-    car.steering = steer(cars, i, lanes, sight)
-    car.acceleration = _KP_ACCELERATION * (car.target_speed - car.speed)
 
 
 @merged
@@ -177,23 +231,6 @@ def _lane_on(road, lane_id, k, x, y, net, lanes):
 
 
 @merged
-def _drive_in_traffic(cars, i, n, changing, net, lanes, sight, idm):
-    car = cars[i]
-    follow_road(cars, i, net, lanes, sight)
-    # who changes its mind asks for accelerations more than once, on which only the car ahead differs
-    free = idm.comfort_acc_max * (1 - _speed_ratio(car, lanes) ** car.delta)
-    ahead = car_ahead(car.lane, i, n, net, lanes, sight)
-    a = free - _interaction(cars, i, ahead, lanes, sight.s, idm)
-    if car.changes_lane:
-        _change_lane(cars, i, n, changing, free, a, net, lanes, sight, idm)
-    car.steering = steer(cars, i, lanes, sight)
-    if car.lane != car.target_lane:
-        ahead = car_ahead(car.target_lane, i, n, net, lanes, sight)
-        a = min(a, free - _interaction(cars, i, ahead, lanes, sight.s, idm))
-    car.acceleration = clip(a, -idm.acc_max, idm.acc_max)
-
-
-@merged
 def _speed_ratio(car, lanes):
     """Speed over the speed that a car wants on its lane."""
     target = 0.0 if car.kind == DIRECT else car.target_speed
@@ -241,8 +278,7 @@ def desired_gap(cars, i, ahead, idm):
         car.cos,
         car.sin,
     )
-    braking = 2 * np.sqrt(-idm.comfort_acc_max * idm.comfort_acc_min)
-    return idm.distance_wanted + car.speed * idm.time_wanted + car.speed * approach / braking
+    return idm.distance_wanted + car.speed * idm.time_wanted + car.speed * approach / idm.gap_braking
 
 
 @merged

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import typeof
 
-from envs.fast.compiled import compiled, compiling_quickly, kernel, unfolded
+from envs.fast.compiled import compiled, compiling_quickly, kernel, merged, unfolded
 from envs.fast.config import Scenario
 from envs.fast.draws import load_generator
 from envs.fast.drivers import take_meta_action
@@ -125,7 +125,7 @@ def _populate(cars, episode, order, world, sight, flow):
         open_intersection(cars, episode, order, net, sight, config, flow, world.target_speeds)
 
 
-@compiled
+@merged
 def _go_on(cars, episode, order, world, plans, watch, mode, flow):
     """Cars come and go between two decisions."""
     if flow is not None:
@@ -148,10 +148,10 @@ def _restart(cars, episode, order, world, sight, distances, plans, watch, mode, 
     rate(cars, episode, NO_ACTION, lanes, sight, config, step)
     step.raw_reward = 0.0
     _report(cars, episode, mode, 0.0, step)
-    _see(cars, episode, world, sight, out)
+    _see_apart(cars, episode, world, sight, out)
 
 
-@compiled
+@merged
 def _see(cars, episode, world, sight, out):
     observe(
         cars,
@@ -165,6 +165,12 @@ def _see(cars, episode, world, sight, out):
         world.target_speeds,
         out,
     )
+
+
+@compiled
+def _see_apart(cars, episode, world, sight, out):
+    """`_see` where it is rare; the kernel would else contain it thrice."""
+    _see(cars, episode, world, sight, out)
 
 
 @compiled
@@ -239,7 +245,7 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
         outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
             survey(cars, episode, world.network, sight, world.flow)
-            _see(cars, episode, world, sight, observation)
+            _see_apart(cars, episode, world, sight, observation)
             _report(cars, episode, mode, 0.0, step)
             continue
         if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):

@@ -40,7 +40,7 @@ def act(cars, episode, order, net, sight, config, flow):
     """Carry the commands out, survey the result and find collisions."""
     if flow is not None:
         regulate(cars, episode, net, sight, config, flow[0])
-    move(cars, episode.vehicles, config.dt, config.max_speed, config.min_speed)
+    move(cars, episode.vehicles, sight, config.dt, config.max_speed, config.min_speed)
     if flow is None:
         project(cars, episode.cars, net, sight)
         update_lanes(cars, episode.vehicles, net, sight)

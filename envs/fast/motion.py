@@ -14,15 +14,17 @@ def set_heading(car, heading):
 
 
 @merged
-def move(cars, n_vehicles, dt, max_speed, min_speed):
+def move(cars, n_vehicles, sight, dt, max_speed, min_speed):
     """Advance all vehicles by one frame.
 
     Args:
       cars: `[N]` CAR.
       n_vehicles: how many of them move.
+      sight: working memory.
       dt: length of a frame [s].
       max_speed, min_speed: range of speeds of a directly driven car [m/s].
     """
+    turning, straight = 0, 0
     for i in range(n_vehicles):
         car = cars[i]
         if car.kind == TRAFFIC:
@@ -31,25 +33,35 @@ def move(cars, n_vehicles, dt, max_speed, min_speed):
             _limit(car, max_speed, min_speed)
         else:
             _limit(car, 40.0, -40.0)
-        speed, heading = car.speed, car.heading
-        slip = 0.0
-        if car.steering != 0.0:
-            slip = np.arctan(0.5 * np.tan(car.steering))
-            car.x += speed * np.cos(heading + slip) * dt
-            car.y += speed * np.sin(heading + slip) * dt
-        else:
-            car.x += speed * car.cos * dt
-            car.y += speed * car.sin * dt
-        if car.hit:
-            car.x += car.impact_x
-            car.y += car.impact_y
-            car.crashed, car.hit = True, False
+        # who turns cannot be foretold
+        sight.some[turning], sight.others[straight] = i, i
+        turning += car.steering != 0.0
+        straight += car.steering == 0.0
+    for b in range(straight):
+        car = cars[sight.others[b]]
+        _displace(car, car.cos, car.sin, dt)
+        car.speed += car.acceleration * dt
+    for b in range(turning):
+        car = cars[sight.some[b]]
+        slip = np.arctan(0.5 * np.tan(car.steering))
+        _displace(car, np.cos(car.heading + slip), np.sin(car.heading + slip), dt)
         if slip != 0.0:
-            set_heading(car, heading + speed * np.sin(slip) / (car.length / 2) * dt)
+            set_heading(car, car.heading + car.speed * np.sin(slip) / (car.length / 2) * dt)
         car.speed += car.acceleration * dt
 
 
-@compiled
+@merged
+def _displace(car, cos, sin, dt):
+    """Move a car in a direction, and by the impact if it was hit."""
+    car.x += car.speed * cos * dt
+    car.y += car.speed * sin * dt
+    if car.hit:
+        car.x += car.impact_x
+        car.y += car.impact_y
+        car.crashed, car.hit = True, False
+
+
+@merged
 def _limit(car, max_speed, min_speed):
     """A wreck brakes to a stop; nobody accelerates beyond the range of speeds."""
     if car.crashed:

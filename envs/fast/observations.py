@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled
+from envs.fast.compiled import compiled, merged
 from envs.fast.config import COS_H, HEADING, PRESENCE, TIME_TO_COLLISION, VX, VY, X, Y
 from envs.fast.floats import clip, dot, lmap, norm, not_zero
 from envs.fast.sight import locate
@@ -13,7 +13,7 @@ _BEHIND = -10.0  # twice the length of a car [m]
 _LANE_WIDTH = 4.0  # `AbstractLane.DEFAULT_WIDTH` [m]
 
 
-@compiled
+@merged
 def observe(cars, episode, lanes, sight, config, features, ranges, connected, target_speeds, out):
     """The observation that the configuration asks for.
 
@@ -32,7 +32,7 @@ def observe(cars, episode, lanes, sight, config, features, ranges, connected, ta
         _observe_kinematics(cars, episode, lanes, sight, config, features, ranges, out)
 
 
-@compiled
+@merged
 def _observe_kinematics(cars, episode, lanes, sight, config, features, ranges, out):
     """The ego and the cars nearest to it along its lane (`KinematicObservation`, `ExitObservation`)."""
     ego = cars[episode.ego]
@@ -59,7 +59,7 @@ def _observe_kinematics(cars, episode, lanes, sight, config, features, ranges, o
             out[row * n_features + k] = value
 
 
-@compiled
+@merged
 def _find_nearest(cars, episode, lanes, sight, config):
     """Fill `sight.nearest` with the observed road users, nearest along the lane first; returns how many."""
     ego = cars[episode.ego]

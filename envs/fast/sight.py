@@ -32,6 +32,10 @@ class Sight(NamedTuple):
     crowd: np.ndarray  # `[L]` how many
     rank: np.ndarray  # `[L, N]` place of a car among the members, or the one it would take; -1 = not known
     changing: np.ndarray  # `[N]` cars that head for another lane
+    some: np.ndarray  # `[N]` cars that the step at hand has more to do with
+    others: np.ndarray  # `[N]` the others
+    free: np.ndarray  # `[N]` accelerations on a free road [m/s^2]
+    wanted: np.ndarray  # `[N]` accelerations decided on [m/s^2]
     pairs: np.ndarray  # `[N (N - 1) / 2]` pairs that may collide
     corners: np.ndarray  # `[2, 4, 2]` of two boxes [m]
     nearest: np.ndarray  # `[N]` observed cars
@@ -54,6 +58,10 @@ def make_sight(n_lanes, n, speeds, lanes, times):
         np.empty(n_lanes, np.int64),
         np.empty((n_lanes, n), np.int64),
         np.empty(n, np.int64),
+        np.empty(n, np.int64),
+        np.empty(n, np.int64),
+        np.empty(n),
+        np.empty(n),
         np.empty(max(n * (n - 1) // 2, 1), np.int64),
         np.empty((2, 4, 2)),
         np.empty(n, np.int64),
@@ -72,10 +80,10 @@ def make_sight(n_lanes, n, speeds, lanes, times):
 def project(cars, n, net, sight):
     """Lane coordinates of all cars on all lanes."""
     if net.spacing > 0.0:
-        for i in range(n):
-            x, y = cars[i].x, cars[i].y
-            for k in range(len(net.lanes)):
-                sight.s[k, i], sight.lateral[k, i] = x, y - net.lanes[k].y
+        for k in range(len(net.lanes)):
+            s, lateral, y = sight.s[k], sight.lateral[k], net.lanes[k].y
+            for i in range(n):
+                s[i], lateral[i] = cars[i].x, cars[i].y - y
         return
     for k in range(len(net.lanes)):
         lane = net.lanes[k]
@@ -197,11 +205,14 @@ def line_up(n, net, order, sight):
 def _line_up_along_x(n, lane, order, lateral, s, sight, k):
     """`line_up` on a lane along the x-axis; returns how many cars are on it."""
     members, rank = sight.members[k], sight.rank[k]
+    for i in range(n):
+        rank[i] = is_on_lane(lane, s[i], lateral[i], 1.0)
     count = 0
     for a in range(n):
         i = order[a]
+        on_lane = rank[i]
         members[count], rank[i] = i, count
-        count += is_on_lane(lane, s[i], lateral[i], 1.0)
+        count += on_lane
     return count
 
 

@@ -14,10 +14,16 @@ _MAX_STEERING = ControlledVehicle.MAX_STEERING_ANGLE  # [rad]
 
 
 @merged
+def is_aligned(lane, s, lateral, heading, speed):
+    """Is there nothing to steer at a point in lane coordinates?"""
+    return (lateral == 0.0) & (heading_at(lane, s + speed * _PURSUIT) == heading)
+
+
+@merged
 def steering_angle(lane, s, lateral, heading, speed, length):
     """Steering angle of `ControlledVehicle.steering_control` at a point in lane coordinates [rad]."""
     reference = heading_at(lane, s + speed * _PURSUIT)
-    if lateral == 0.0 and reference == heading:
+    if is_aligned(lane, s, lateral, heading, speed):
         return 0.0
     speed = not_zero(speed)
     reference += clip(np.arcsin(clip(-_KP_LATERAL * lateral / speed, -1.0, 1.0)), -np.pi / 4, np.pi / 4)
