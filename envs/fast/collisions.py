@@ -48,7 +48,7 @@ def collide(cars, episode, order, sight, dt):
         _collide_pair(cars, sight.pairs[m] // n, sight.pairs[m] % n, sight.corners, dt)
 
 
-@compiled
+@merged
 def _note_pair(cars, i, j, n, vehicles, found, reach, pairs, dt):
     """Add a pair to the `found` ones if the two are near each other; returns how many there are then."""
     if abs(cars[j].y - cars[i].y) > reach:
@@ -60,7 +60,7 @@ def _note_pair(cars, i, j, n, vehicles, found, reach, pairs, dt):
     return found
 
 
-@compiled
+@merged
 def _insert(values, count, value):
     """Add a value to `count` sorted ones."""
     while count > 0 and values[count - 1] > value:
@@ -88,13 +88,13 @@ def _hit(car, x, y):
     car.hit, car.impact_x, car.impact_y = True, x, y
 
 
-@compiled
+@merged
 def diagonal(car):
     """Length of the diagonal of the car's box [m]."""
     return np.sqrt(car.length**2 + car.width**2)
 
 
-@compiled
+@merged
 def is_near(first, second, dt):
     """The quick test before the exact one. Only the speed of the first car counts."""
     centres = norm(second.x - first.x, second.y - first.y)

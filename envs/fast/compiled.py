@@ -17,7 +17,7 @@ _config: Any = numba.config
 _inner = {"_nrt": False, "error_model": "numpy"}
 
 # What Python calls as well, outside the loops.
-callable_too = _njit(**_inner)
+callable_too = _njit(**_inner, forceinline=True)
 
 # The same for what has one caller only: it becomes part of its source and is never compiled alone,
 # which saves compile time.

@@ -143,7 +143,7 @@ def take_meta_action(cars, i, action, net, lanes, sight, target_speeds):
             car.target_lane = lane
 
 
-@compiled
+@merged
 def speed_to_index(speed, target_speeds):
     """Index of the target speed nearest to `speed`, the speeds being evenly spaced."""
     last = len(target_speeds) - 1
@@ -238,7 +238,7 @@ def _speed_ratio(car, lanes):
     return max(car.speed, 0.0) / abs(not_zero(target))
 
 
-@compiled
+@merged
 def _interaction(cars, i, ahead, lanes, s, idm):
     """What car `ahead`, -1 = none, takes from the acceleration of car `i` on a free road (IDM) [m/s^2]."""
     if ahead < 0:
@@ -252,7 +252,7 @@ def _interaction(cars, i, ahead, lanes, s, idm):
     return idm.comfort_acc_max * (ratio * ratio)
 
 
-@compiled
+@merged
 def _has_to_brake(cars, i, ahead, delta, lanes, s, idm):
     """Would car `i`, -1 = none, brake harder behind car `ahead` than a change of lanes may impose on it?
 
@@ -268,7 +268,7 @@ def _has_to_brake(cars, i, ahead, delta, lanes, s, idm):
     return idm.comfort_acc_max * (1 - ratio**delta) - taken < -idm.max_braking_imposed
 
 
-@compiled
+@merged
 def desired_gap(cars, i, ahead, idm):
     """Distance that car `i` wants to the car ahead, centre to centre [m]."""
     car, front = cars[i], cars[ahead]

@@ -10,7 +10,7 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from envs.fast.compiled import compiled
+from envs.fast.compiled import merged
 
 _intrinsic: Any = intrinsic
 
@@ -26,25 +26,25 @@ def _fma(typing_context, a, b, c):
     return signature, generate
 
 
-@compiled
+@merged
 def dot(ax, ay, bx, by):
     """`np.dot` of two plane vectors."""
     return _fma(ay, by, ax * bx)
 
 
-@compiled
+@merged
 def norm(x, y):
     """`np.linalg.norm` of a plane vector."""
     return np.sqrt(dot(x, y, x, y))
 
 
-@compiled
+@merged
 def clip(x, low, high):
     """`np.clip` of a float."""
     return min(max(x, low), high)
 
 
-@compiled
+@merged
 def wrap_to_pi(angle):
     """`highway_env.utils.wrap_to_pi`, without the division where the angle is in range already [rad]."""
     shifted = angle + np.pi
@@ -53,7 +53,7 @@ def wrap_to_pi(angle):
     return shifted - np.pi
 
 
-@compiled
+@merged
 def not_zero(x):
     """`highway_env.utils.not_zero`: at least 0.01 away from zero."""
     if abs(x) > 1e-2:
@@ -61,7 +61,7 @@ def not_zero(x):
     return 1e-2 if x >= 0.0 else -1e-2
 
 
-@compiled
+@merged
 def lmap(v, x0, x1, y0, y1):
     """`highway_env.utils.lmap`: linear map of [x0, x1] to [y0, y1]."""
     return y0 + (v - x0) * (y1 - y0) / (x1 - x0)

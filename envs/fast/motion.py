@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled, merged
+from envs.fast.compiled import merged
 from envs.fast.state import DIRECT, TRAFFIC
 
 
-@compiled
+@merged
 def set_heading(car, heading):
     """Turn a car, and keep its direction along."""
     car.heading = heading

@@ -11,7 +11,7 @@ import numpy as np
 from highway_env.road.lane import CircularLane, SineLane, StraightLane
 from highway_env.vehicle.controller import ControlledVehicle
 
-from envs.fast.compiled import callable_too, compiled
+from envs.fast.compiled import callable_too, compiled, merged
 from envs.fast.floats import dot, norm, wrap_to_pi
 from envs.fast.state import CAR_LENGTH
 
@@ -225,26 +225,26 @@ def heading_at(lane, s):
     return lane.turn * s / lane.radius + lane.start_phase + np.pi / 2 * lane.turn
 
 
-@compiled
+@merged
 def distance(lane, s, lateral):
     """L1 distance of a point in lane coordinates to the lane [m]."""
     return abs(lateral) + max(s - lane.length, 0.0) + max(0.0 - s, 0.0)
 
 
-@compiled
+@merged
 def is_on_lane(lane, s, lateral, margin):
     """Is a point in lane coordinates on the lane, or nearer to it than `margin` [m]?"""
     # without branches: which of several lanes a car is on cannot be foretold
     return (abs(lateral) <= lane.width / 2 + margin) & (s >= -CAR_LENGTH) & (s < lane.length + CAR_LENGTH)
 
 
-@compiled
+@merged
 def is_reachable(lane, s, lateral):
     """May a car at this point in lane coordinates change to the lane?"""
     return not lane.forbidden and abs(lateral) <= 2 * lane.width and 0.0 <= s < lane.length + CAR_LENGTH
 
 
-@compiled
+@merged
 def is_after_end(lane, s):
     """Has a car at arc length `s` come to the end of the lane?"""
     return s > lane.length - CAR_LENGTH / 2

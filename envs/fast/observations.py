@@ -89,7 +89,7 @@ def _find_nearest(cars, episode, lanes, sight, config):
     return count
 
 
-@compiled
+@merged
 def _feature(feature, car):
     if feature == PRESENCE:
         return 1.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled
+from envs.fast.compiled import compiled, merged
 from envs.fast.config import EXIT, HIGHWAY, INTERSECTION, MERGE, TWO_WAY
 from envs.fast.floats import clip, lmap
 from envs.fast.network import is_on_lane
@@ -14,7 +14,7 @@ _EXIT_DISTANCE = 25.0  # beyond an intersection [m]
 NO_ACTION = np.int64(-1)
 
 
-@compiled
+@merged
 def is_on_road(cars, i, lanes, sight):
     """Is a car on the lane that is nearest to it?"""
     k = cars[i].lane
@@ -86,13 +86,13 @@ def rate(cars, episode, action, lanes, sight, config, step):
     return _normalized(_weigh(step, config), config) * on_road
 
 
-@compiled
+@merged
 def _scaled(speed, config):
     """Speed on the scale of the rewarded range."""
     return lmap(speed, config.speed_low, config.speed_high, 0.0, 1.0)
 
 
-@compiled
+@merged
 def _normalized(reward, config):
     if config.normalize_reward:
         return lmap(reward, config.reward_low, config.reward_high, 0.0, 1.0)
@@ -109,7 +109,7 @@ def _slowness(cars, episode, lane):
     return total
 
 
-@compiled
+@merged
 def _weigh(step, config):
     """Weighted sum of the components, added up in their order."""
     reward = config.weight_0 * step.reward_0
@@ -119,7 +119,7 @@ def _weigh(step, config):
     return reward + config.weight_4 * step.reward_4
 
 
-@compiled
+@merged
 def is_terminated(cars, episode, lanes, sight, config):
     """Is the state terminal?"""
     ego = cars[episode.ego]
@@ -128,7 +128,7 @@ def is_terminated(cars, episode, lanes, sight, config):
     return ego.crashed or ego.x > config.end_x or off_road or arrived
 
 
-@compiled
+@merged
 def is_truncated(episode, config):
     """Is the time over?"""
     return episode.time >= config.duration or (config.max_steps > 0 and episode.steps >= config.max_steps)
