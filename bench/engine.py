@@ -4,7 +4,7 @@
     python bench/engine.py --growth                       and growth with vehicles, environments, threads
 
 Random actions; observations, infos and autoreset included; one thread, so figures are per core. All
-candidates take turns for several rounds, and medians over the rounds are compared: the speed of a
+candidates take turns for several rounds, and ratios are medians over the rounds: the speed of a
 shared machine changes within seconds.
 """
 
@@ -74,7 +74,7 @@ def against_original(env_id: str, config: Config) -> None:
             candidate.take_turn(config.seconds)
     print(f"{env_id}: highway-env {1e6 / original.microseconds:.1f} decisions/s per core")
     for n, candidate in engine.items():
-        gain = original.microseconds / candidate.microseconds
+        gain = np.median(np.array(original.times) / np.array(candidate.times))
         print(f"  {n:5d} environments: {candidate.microseconds:7.1f} us per decision and core, {gain:6.0f} x")
     for mode, candidate in shielded.items():
         extra = np.median(np.array(candidate.times) / np.array(engine[1024].times)) - 1
