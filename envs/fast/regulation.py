@@ -39,7 +39,7 @@ def regulate(cars, episode, net, sight, config, flow):
         if car.yields:
             car.target_speed, car.yields = lanes[car.lane].speed_limit, False
         if car.kind == DIRECT:
-            _predict_steering(car, sight.ghost, futures[i], config)
+            _predict_steering(car, sight, futures[i], config)
         else:
             _predict_route(car, sight.s[car.lane, i], net, futures[i])
         _enclose(futures[i])
@@ -102,12 +102,13 @@ def _route_lane(car, step, net):
 
 
 @compiled
-def _predict_steering(car, ghost, future, config):
+def _predict_steering(car, sight, future, config):
     """Poses of a directly driven car that keeps its steering and does not accelerate."""
+    ghost = sight.ghost
     ghost[0] = car
     ghost[0].acceleration = 0.0
     for t in range(MOMENTS):
-        move(ghost, len(ghost), _STEP, config.max_speed, config.min_speed)
+        move(ghost, len(ghost), sight, _STEP, config.max_speed, config.min_speed)
         future[t, 0], future[t, 1], future[t, 2] = ghost[0].x, ghost[0].y, ghost[0].heading
 
 
