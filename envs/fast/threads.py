@@ -1,7 +1,7 @@
 """How a batch is shared among threads."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 
 _PARTS = 16  # per thread
 _SMALLEST = 8  # environments in a part
@@ -23,7 +23,7 @@ class Crew:
 
     def work(self, size: int, task: Callable[[int, int, int], None]) -> None:
         """Call `task(thread, first, last)` for parts that make up `size` items, no thread twice at a time."""
-        length = size if self._pool is None else max(-(-size // (_PARTS * self._threads)), _SMALLEST)
+        length = max(size, 1) if self._pool is None else max(-(-size // (_PARTS * self._threads)), _SMALLEST)
         parts = iter([(first, min(first + length, size)) for first in range(0, size, length)])
 
         def take_parts(thread: int) -> None:
@@ -31,7 +31,10 @@ class Crew:
                 task(thread, first, last)
 
         helpers = [self._pool.submit(take_parts, thread) for thread in range(1, self._threads)] if self._pool else []
-        take_parts(0)
+        try:
+            take_parts(0)
+        finally:
+            wait(helpers)
         for helper in helpers:
             helper.result()
 
