@@ -70,6 +70,7 @@ def no_roads() -> Roads:
             np.zeros((0, 0, 6)),
             rows,
             none,
+            np.zeros((0, 0), np.int32),
             np.zeros((0, 0)),
             np.zeros((0, 0, 0, 4), np.float32),
             np.zeros((0, 0, 0), np.float32),

@@ -119,6 +119,7 @@ def compile_paths(network, top_speed: float, room: float = 0.0) -> Paths:
         swept,
         cells,
         lane,
+        _reached(lane),
         offset,
         conflicts,
         first,
@@ -128,6 +129,12 @@ def compile_paths(network, top_speed: float, room: float = 0.0) -> Paths:
         boxes,
         _joins(lane, offset),
     )
+
+
+def _reached(lane) -> np.ndarray:
+    """`Paths.reached`."""
+    same = np.column_stack([np.zeros(len(lane), bool), lane[:, 1:] == lane[:, :-1]])
+    return np.maximum.accumulate(np.where(same, 0, np.arange(lane.shape[1])), axis=1).astype(np.int32)
 
 
 def _joins(lane, offset) -> np.ndarray:

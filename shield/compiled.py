@@ -90,6 +90,34 @@ def choose(condition: Any, this: Any, that: Any) -> Any:
     return np.where(condition, this, that)
 
 
+def smaller(a: Any, b: Any) -> Any:
+    """`np.minimum`, which would look for nan in compiled code even where there are only two floats."""
+    return np.minimum(a, b)
+
+
+def larger(a: Any, b: Any) -> Any:
+    """`np.maximum` likewise."""
+    return np.maximum(a, b)
+
+
+def _are_numbers(*arguments: Any) -> bool:
+    return all(isinstance(argument, types.Number | types.Omitted) for argument in arguments)
+
+
+@overload(smaller)
+def _smaller(a, b):
+    if _are_numbers(a, b):
+        return lambda a, b: a if a < b else b
+    return lambda a, b: np.minimum(a, b)
+
+
+@overload(larger)
+def _larger(a, b):
+    if _are_numbers(a, b):
+        return lambda a, b: a if a > b else b
+    return lambda a, b: np.maximum(a, b)
+
+
 @overload(choose)
 def _choose(condition, this, that):
     if isinstance(condition, types.Boolean):

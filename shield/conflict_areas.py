@@ -24,6 +24,7 @@ class Paths(NamedTuple):
     boxes: np.ndarray  # `[P, C, 6]` what the ego sweeps in each cell
     cells: np.ndarray  # `[P]` cells of each path
     lane: np.ndarray  # `[P, C]` lane that a car in the cell follows
+    reached: np.ndarray  # `[P, C]` int32: cell in which a path reaches the lane of a cell
     offset: np.ndarray  # `[P, L]` arc length at which a lane begins on a path, nan = not part of it [m]
     conflicts: np.ndarray  # `[P, P, C, 4]` float32: from, to, from, to on the second path [m]; inf, -inf = none
     first: np.ndarray  # `[P, P, C]` float32: where the second path first conflicts with the first from a cell on [m]

@@ -231,11 +231,8 @@ def is_follower(scene, threat, established):
 @inner_merged
 def _entered(paths, path, s):
     """Where on a path a driver at `s` headed for its lane [m], and the lane before, -1 = none."""
-    i = cell_of(s, paths.cells[path])
-    lane = paths.lane[path, i]
-    while i >= 0 and paths.lane[path, i] == lane:
-        i -= 1
-    return (i + 1) * CELL, paths.lane[path, i] if i >= 0 else -1
+    first = paths.reached[path, cell_of(s, paths.cells[path])]
+    return first * CELL, paths.lane[path, first - 1] if first > 0 else -1
 
 
 @inner

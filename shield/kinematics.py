@@ -5,7 +5,7 @@ All functions are compiled, in SI units. Distances take floats or arrays that br
 
 import numpy as np
 
-from shield.compiled import compiled, compiled_for_arrays
+from shield.compiled import compiled, compiled_for_arrays, larger, smaller
 
 _TINY = 1e-300  # stands in for a positive divisor where the dividend is 0
 
@@ -13,14 +13,14 @@ _TINY = 1e-300  # stands in for a positive divisor where the dividend is 0
 @compiled_for_arrays
 def speed_after_response(v, rho, a, v_cap):
     """Speed after accelerating at `a` for `rho`, never beyond `v_cap` [m/s]. A faster car keeps its speed."""
-    return np.minimum(v + a * rho, np.maximum(v_cap, v))
+    return smaller(v + a * rho, larger(v_cap, v))
 
 
 @compiled_for_arrays
 def response_distance(v, rho, a, v_cap):
     """Distance covered while accelerating at `a` for `rho`, speed limited to `v_cap` [m]."""
     cut = v + a * rho - speed_after_response(v, rho, a, v_cap)  # speed that the cap takes away
-    return v * rho + 0.5 * a * rho**2 - cut**2 / (2 * np.maximum(a, _TINY))
+    return v * rho + 0.5 * a * rho**2 - cut**2 / (2 * larger(a, _TINY))
 
 
 @compiled_for_arrays
@@ -45,8 +45,8 @@ def forward_reach(v, rho, a, b, v_cap=np.inf):
     approach e(w) of Lemma 4; on the longitudinal one it makes Lemma 2 and 3 total.
     """
     v_rho = speed_after_response(v, rho, a, v_cap)
-    end = response_distance(v, rho, a, v_cap) + stopping_distance(np.maximum(v_rho, 0.0), b)
-    return np.maximum(end, 0.0)
+    end = response_distance(v, rho, a, v_cap) + stopping_distance(larger(v_rho, 0.0), b)
+    return larger(end, 0.0)
 
 
 @compiled_for_arrays
@@ -56,16 +56,16 @@ def speed_envelope(tau, v, rho, a, b, v_cap=np.inf):
     Accelerate at `a` during `rho`, then brake at `b` to rest (first phase and second phase of the
     proper responses, Defs. 4 and 8), starting from `v` >= 0.
     """
-    v_response = speed_after_response(v, np.minimum(tau, rho), a, v_cap)
-    return np.maximum(v_response - b * np.maximum(tau - rho, 0.0), 0.0)
+    v_response = speed_after_response(v, smaller(tau, rho), a, v_cap)
+    return larger(v_response - b * larger(tau - rho, 0.0), 0.0)
 
 
 @compiled_for_arrays
 def travel(tau, v, rho, a, b, v_cap=np.inf):
     """Distance covered `tau` after the danger threshold at the speeds of `speed_envelope` [m]."""
     v_rho = speed_after_response(v, rho, a, v_cap)
-    t_brake = np.minimum(np.maximum(tau - rho, 0.0), v_rho / b)
-    response = response_distance(v, np.minimum(tau, rho), a, v_cap)
+    t_brake = smaller(larger(tau - rho, 0.0), v_rho / b)
+    response = response_distance(v, smaller(tau, rho), a, v_cap)
     return response + v_rho * t_brake - 0.5 * b * t_brake**2
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 
 import envs
@@ -10,7 +11,7 @@ import shield
 from envs.fast.compiled import sources
 from envs.fast.engine import run
 from envs.fast.floats import norm
-from shield.compiled import inner, inner_merged
+from shield.compiled import inner, inner_merged, larger, smaller
 from shield.plans import step
 
 
@@ -53,3 +54,13 @@ def test_one_kernel_runs_with_the_shield_and_without(env_id):
     shielded, bare = (envs.make_vec(env_id, 2, shield=mode).engine for mode in ("override", None))
     for part in ("world", "batch", "film", "settings"):
         assert numba.typeof(getattr(shielded, part)) == numba.typeof(getattr(bare, part)), part
+
+
+def test_the_smaller_and_the_larger_are_those_of_numpy():
+    compiled = numba.njit(lambda a, b: (smaller(a, b), larger(a, b)))
+    values = [-np.inf, -1.5, 0.0, 2, np.inf]
+    for a in values:
+        for b in values:
+            assert compiled(a, b) == (np.minimum(a, b), np.maximum(a, b)) == (smaller(a, b), larger(a, b))
+        expected = np.minimum(values, a), np.maximum(values, a)
+        np.testing.assert_array_equal(compiled(np.array(values), a), expected)
