@@ -91,7 +91,7 @@ def choose(condition: Any, this: Any, that: Any) -> Any:
 
 
 def smaller(a: Any, b: Any) -> Any:
-    """`np.minimum`, which would look for nan in compiled code even where there are only two floats."""
+    """`np.minimum`, which for floats would look for nan in compiled code; one in `b` is kept all the same."""
     return np.minimum(a, b)
 
 

@@ -20,7 +20,7 @@ def speed_after_response(v, rho, a, v_cap):
 def response_distance(v, rho, a, v_cap):
     """Distance covered while accelerating at `a` for `rho`, speed limited to `v_cap` [m]."""
     cut = v + a * rho - speed_after_response(v, rho, a, v_cap)  # speed that the cap takes away
-    return v * rho + 0.5 * a * rho**2 - cut**2 / (2 * larger(a, _TINY))
+    return v * rho + 0.5 * a * rho**2 - cut**2 / (2 * larger(_TINY, a))
 
 
 @compiled_for_arrays
@@ -45,8 +45,8 @@ def forward_reach(v, rho, a, b, v_cap=np.inf):
     approach e(w) of Lemma 4; on the longitudinal one it makes Lemma 2 and 3 total.
     """
     v_rho = speed_after_response(v, rho, a, v_cap)
-    end = response_distance(v, rho, a, v_cap) + stopping_distance(larger(v_rho, 0.0), b)
-    return larger(end, 0.0)
+    end = response_distance(v, rho, a, v_cap) + stopping_distance(larger(0.0, v_rho), b)
+    return larger(0.0, end)
 
 
 @compiled_for_arrays
@@ -57,14 +57,14 @@ def speed_envelope(tau, v, rho, a, b, v_cap=np.inf):
     proper responses, Defs. 4 and 8), starting from `v` >= 0.
     """
     v_response = speed_after_response(v, smaller(tau, rho), a, v_cap)
-    return larger(v_response - b * larger(tau - rho, 0.0), 0.0)
+    return larger(0.0, v_response - b * larger(0.0, tau - rho))
 
 
 @compiled_for_arrays
 def travel(tau, v, rho, a, b, v_cap=np.inf):
     """Distance covered `tau` after the danger threshold at the speeds of `speed_envelope` [m]."""
     v_rho = speed_after_response(v, rho, a, v_cap)
-    t_brake = smaller(larger(tau - rho, 0.0), v_rho / b)
+    t_brake = smaller(larger(0.0, tau - rho), v_rho / b)
     response = response_distance(v, smaller(tau, rho), a, v_cap)
     return response + v_rho * t_brake - 0.5 * b * t_brake**2
 

@@ -64,3 +64,4 @@ def test_the_smaller_and_the_larger_are_those_of_numpy():
             assert compiled(a, b) == (np.minimum(a, b), np.maximum(a, b)) == (smaller(a, b), larger(a, b))
         expected = np.minimum(values, a), np.maximum(values, a)
         np.testing.assert_array_equal(compiled(np.array(values), a), expected)
+        assert np.isnan(compiled(a, np.nan)).all()

@@ -172,3 +172,14 @@ def test_arrays_give_what_a_loop_over_floats_gives():
     assert reach(v, 1.0, 3.5, 4.0, 30.0).tolist() == [reach(x, 1.0, 3.5, 4.0, 30.0) for x in v]
     w = np.linspace(-8.0, 8.0, 9)
     assert forward_reach(w, 1.0, 0.2, 0.8).tolist() == [forward_reach(x, 1.0, 0.2, 0.8) for x in w]
+
+
+@pytest.mark.parametrize("v_cap", [NO_CAP, 30.0])
+def test_a_speed_that_is_not_known_gives_distances_that_are_not(v_cap):
+    """A bound made of nan must never look like one that is kept."""
+    assert math.isnan(speed_after_response(math.nan, 1.0, 2.0, v_cap))
+    for distance in (response_distance(math.nan, 1.0, 2.0, v_cap), reach(math.nan, 1.0, 2.0, 4.0, v_cap)):
+        assert math.isnan(distance)
+    assert math.isnan(forward_reach(math.nan, 1.0, 2.0, 4.0, v_cap))
+    assert math.isnan(speed_envelope(0.5, math.nan, 1.0, 2.0, 4.0, v_cap))
+    assert math.isnan(travel(2.0, math.nan, 1.0, 2.0, 4.0, v_cap))
