@@ -14,7 +14,7 @@ import numpy as np
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import wrap_to_pi
 from envs.fast.network import SINE, STRAIGHT, distance, heading_at, is_on_lane, local_coordinates
-from envs.fast.state import CAR, CAR_LENGTH
+from envs.fast.state import CAR
 from envs.intent import CAR_ON_ROAD
 from shield.junction import SAMPLE
 from shield.plans import THREAT
@@ -193,21 +193,20 @@ def line_up(n, net, order, sight):
     """Sort the cars on each lane by arc length, ties by index."""
     for k in range(len(net.lanes)):
         if net.spacing > 0.0:
-            sight.crowd[k] = _line_up_along_x(n, net.lanes[k], order, sight.lateral[k], sight.s[k], sight, k)
+            sight.crowd[k] = _line_up_along_x(k, n, net.lanes[k], order, sight)
         else:
-            sight.crowd[k] = _line_up_along(n, net.lanes[k], order, sight.lateral[k], sight.s[k], sight, k)
+            sight.crowd[k] = _line_up_along(k, n, net.lanes[k], order, sight)
 
 
 # Which cars are on a lane cannot be foretold, so the next two have no branches that ask for it.
 
 
 @merged
-def _line_up_along_x(n, lane, order, lateral, s, sight, k):
+def _line_up_along_x(k, n, lane, order, sight):
     """`line_up` on a lane along the x-axis; returns how many cars are on it."""
-    members, rank = sight.members[k], sight.rank[k]
-    aside, end = lane.width / 2 + 1.0, lane.length + CAR_LENGTH
-    for i in range(n):  # as `is_on_lane`
-        rank[i] = (abs(lateral[i]) <= aside) & (s[i] >= -CAR_LENGTH) & (s[i] < end)
+    s, lateral, members, rank = sight.s[k], sight.lateral[k], sight.members[k], sight.rank[k]
+    for i in range(n):
+        rank[i] = is_on_lane(lane, s[i], lateral[i], 1.0)
     count = 0
     for a in range(n):
         i = order[a]
@@ -218,9 +217,9 @@ def _line_up_along_x(n, lane, order, lateral, s, sight, k):
 
 
 @merged
-def _line_up_along(n, lane, order, lateral, s, sight, k):
+def _line_up_along(k, n, lane, order, sight):
     """`line_up` on any lane; who is not on it gets no rank."""
-    members, rank = sight.members[k], sight.rank[k]
+    s, lateral, members, rank = sight.s[k], sight.lateral[k], sight.members[k], sight.rank[k]
     for i in range(n):
         rank[i] = 0 if is_on_lane(lane, s[i], lateral[i], 1.0) else -1
     count = 0

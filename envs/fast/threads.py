@@ -24,13 +24,15 @@ class Crew:
     def work(self, size: int, task: Callable[[int, int, int], None]) -> None:
         """Call `task(thread, first, last)` for parts that make up `size` items, no thread twice at a time."""
         length = max(size, 1) if self._pool is None else max(-(-size // (_PARTS * self._threads)), _SMALLEST)
-        parts = iter([(first, min(first + length, size)) for first in range(0, size, length)])
+        starts = range(0, size, length)
+        parts = iter([(first, min(first + length, size)) for first in starts])
+        helping = range(1, min(self._threads, len(starts)))  # nobody is woken for nothing
 
         def take_parts(thread: int) -> None:
             for first, last in parts:  # the interpreter lock makes it safe to share
                 task(thread, first, last)
 
-        helpers = [self._pool.submit(take_parts, thread) for thread in range(1, self._threads)] if self._pool else []
+        helpers = [self._pool.submit(take_parts, thread) for thread in helping] if self._pool else []
         try:
             take_parts(0)
         finally:
