@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.network import LANE, compile_network, heading_at, local_coordinates
+from envs.fast.network import LANE, compile_network, heading_at, is_far, local_coordinates
 from envs.paths import beside, compile_paths, lead_of, successors_of, walks
 from shield.compiled import compiled
 from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y, cell_of, reach_beyond, reaches_into
@@ -323,6 +323,8 @@ def _joined(lanes, sets):
 @compiled
 def _fits(lane, car, before, off, turned):
     """May a car be driving on a lane?"""
+    if is_far(lane, car.x, car.y, off, max(before, _BEYOND)):
+        return False
     s, lateral = local_coordinates(lane, car.x, car.y)
     if abs(lateral) > off or s < -before or s > lane.length + _BEYOND:
         return False

@@ -6,12 +6,13 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload
 
-_njit: Any = njit  # its published types lack some options
+_njit: Any = numba.njit  # its published types lack some options
 UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
@@ -76,7 +77,15 @@ def compiled_for_arrays(function: Callable[..., Any]) -> Any:
 
 
 def _stamped(dispatcher: Any) -> Any:
-    dispatcher._cache._cache_file._source_stamp = _stamp(Path(dispatcher.py_func.__code__.co_filename).parent)
+    return cached_for(dispatcher, _stamp(Path(dispatcher.py_func.__code__.co_filename).parent))
+
+
+def cached_for(dispatcher: Any, sources: str) -> Any:
+    """Let what is cached on disk count only for the sources that a `fingerprint` stands for."""
+    index = dispatcher._cache._cache_file
+    index._source_stamp = sources
+    # compared before anything else is read, which may name types that are no more
+    index._version = f"{numba.__version__} {sources}"
     return dispatcher
 
 

@@ -1,17 +1,19 @@
 """How functions are compiled."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numba
 import numpy as np
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 import envs
 import shield
 from envs.fast.compiled import sources
 from envs.fast.engine import run
 from envs.fast.floats import norm
-from shield.compiled import inner, inner_merged, larger, smaller
+from shield.compiled import cached_for, inner, inner_merged, larger, smaller
 from shield.plans import step
 
 
@@ -47,6 +49,24 @@ def test_a_change_in_any_file_that_the_kernel_is_made_of_compiles_it_anew():
     files = {Path(function.__code__.co_filename) for function in _parts(run, set())}
     assert {file.name for file in files} >= {"engine.py", "guard.py", "intent.py", "plans.py"}
     assert files <= {*sources(), *Path(shield.__file__).parent.glob("*.py")}
+
+
+class _Vanished:
+    """A type that the sources of before had, in a cache that they left behind."""
+
+    def __reduce__(self):
+        return getattr, (numba, "vanished")
+
+
+def test_what_other_sources_left_in_the_cache_is_not_read(tmp_path):
+    def index(sources):
+        file = IndexDataCacheFile(str(tmp_path), "run", None)
+        return cached_for(SimpleNamespace(_cache=SimpleNamespace(_cache_file=file)), sources)._cache._cache_file
+
+    index("before").save(_Vanished(), b"")
+    with pytest.raises(AttributeError, match="vanished"):
+        index("before").load(0)
+    assert index("now").load(0) is None
 
 
 @pytest.mark.parametrize("env_id", ["highway-fast-v0", "intersection-v0", "roundabout-v0"])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numba
 
-from shield.compiled import UNWRAPPED, fingerprint, only_inside
+from shield.compiled import UNWRAPPED, cached_for, fingerprint, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
 _config: Any = numba.config
@@ -43,8 +43,7 @@ def kernel(function):
     As in `shield.compiled`, any change in what the kernel may be made of compiles it anew.
     """
     dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **_inner)(function)
-    dispatcher._cache._cache_file._source_stamp = fingerprint(*sources())
-    return dispatcher
+    return cached_for(dispatcher, fingerprint(*sources()))
 
 
 def sources() -> list[Path]:

@@ -12,7 +12,8 @@ from envs.fast.floats import clip, dot, not_zero
 from envs.fast.network import distance, is_after_end, is_reachable, local_coordinates, position
 from envs.fast.sight import car_ahead, car_behind, locate
 from envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
-from envs.fast.steering import is_aligned, steering_angle
+from envs.fast.steering import is_aligned, steer
+from envs.fast.ufuncs import power, power_each
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)  # as in `DiscreteMetaAction.ACTIONS_ALL`
 
@@ -46,13 +47,26 @@ def decide(cars, first, last, n, changing, net, lanes, sight, idm):
     Returns:
       `changing`, with those that have just begun.
     """
-    for i in range(first, last):
-        if _is_in_traffic(cars[i]):
-            sight.free[i] = idm.comfort_acc_max * (1 - _speed_ratio(cars[i], lanes) ** cars[i].delta)
+    _speed_up(cars, first, last, lanes, sight, idm)
     busy = _follow(cars, first, last, n, net, lanes, sight, idm)
     changing = _change_lanes(cars, busy, n, changing, net, lanes, sight, idm)
     _carry_out(cars, first, last, lanes, sight, idm)
     return changing
+
+
+@merged
+def _speed_up(cars, first, last, lanes, sight, idm):
+    """Accelerations on a free road."""
+    count = 0
+    for i in range(first, last):
+        sight.some[count] = i
+        count += _is_in_traffic(cars[i])
+    for b in range(count):
+        car = cars[sight.some[b]]
+        sight.x[b], sight.y[b] = _speed_ratio(car, lanes), car.delta
+    power_each(sight.x, sight.y, sight.z, count)
+    for b in range(count):
+        sight.free[sight.some[b]] = idm.comfort_acc_max * (1 - sight.z[b])
 
 
 @merged
@@ -111,9 +125,7 @@ def _carry_out(cars, first, last, lanes, sight, idm):
             car.steering = 0.0
             sight.some[turning] = i
             turning += not is_aligned(lanes[k], sight.s[k, i], sight.lateral[k, i], car.heading, car.speed)
-    for b in range(turning):
-        i = sight.some[b]
-        cars[i].steering = steer(cars, i, lanes, sight)
+    steer(cars, turning, lanes, sight)
 
 
 @merged
@@ -149,13 +161,6 @@ def speed_to_index(speed, target_speeds):
     last = len(target_speeds) - 1
     x = (speed - target_speeds[0]) / (target_speeds[last] - target_speeds[0])
     return int(clip(np.rint(x * last), 0, last))
-
-
-@merged
-def steer(cars, i, lanes, sight):
-    """Steering angle that leads the car to the middle of its target lane [rad]."""
-    car, k = cars[i], cars[i].target_lane
-    return steering_angle(lanes[k], sight.s[k, i], sight.lateral[k, i], car.heading, car.speed, car.length)
 
 
 # ---------------------------------------------------------------- routes
@@ -265,7 +270,7 @@ def _has_to_brake(cars, i, ahead, delta, lanes, s, idm):
         return True
     if ratio <= 1.0 and -taken >= -idm.max_braking_imposed:
         return False
-    return idm.comfort_acc_max * (1 - ratio**delta) - taken < -idm.max_braking_imposed
+    return idm.comfort_acc_max * (1 - power(ratio, delta)) - taken < -idm.max_braking_imposed
 
 
 @merged

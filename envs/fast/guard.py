@@ -7,12 +7,14 @@ decision and writes the command back.
 from typing import NamedTuple
 
 import numpy as np
+from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.fast.collisions import is_near, overlap
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import norm
 from envs.fast.network import Network, heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
+from envs.fast.ufuncs import arctan, tan
 from envs.highway import road_through
 from envs.intent import Junction, Roads, is_outside, list_threats, no_roads, track_of
 from envs.junction_ego import junction_of
@@ -72,6 +74,7 @@ class Watch(NamedTuple):
     boxes: np.ndarray  # `[2, 4]` length, width, largest half extents of a car and of an obstacle [m]
     blank: np.ndarray  # `[1]` MEMORY of a first sight
     blank_crossing: np.ndarray  # `[1]` CROSSING likewise
+    max_slip: float  # that the ego can steer [rad]
 
 
 def compile_lane_frames(network) -> LaneFrames:
@@ -109,7 +112,8 @@ def make_watch(heading_bound):
     boxes[0, 0], boxes[0, 1] = CAR_LENGTH, CAR_WIDTH
     boxes[0, 2], boxes[0, 3] = largest_half_extents(CAR_LENGTH, CAR_WIDTH, heading_bound)
     boxes[1, 0], boxes[1, 1] = OBSTACLE_SIZE, OBSTACLE_SIZE
-    return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING))
+    max_slip = float(np.arctan(np.tan(ControlledVehicle.MAX_STEERING_ANGLE) / 2))
+    return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING), max_slip)
 
 
 # Of the next two one is None, and numba leaves out of the kernel what it would need.
@@ -212,8 +216,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     n, last = episode.cars - 1, len(past.memory) - 1
     now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
     ego, users, memory = now[last], now[:n], past.memory[:n]
-    wish = Command(acceleration, np.arctan(0.5 * np.tan(steering)))
-    max_slip = np.arctan(np.tan(np.pi / 3) / 2)
+    wish = Command(acceleration, arctan(0.5 * tan(steering)) if steering != 0.0 else 0.0)
     report = shield_frame(
         ego,
         users,
@@ -221,7 +224,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         then[:n],
         memory,
         wish,
-        Body(car.length / 2, max_slip, curvature),
+        Body(car.length / 2, watch.max_slip, curvature),
         settings.ego,
         settings.other,
         settings.rules,
@@ -233,7 +236,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         pairs, broken = judge_frame(ego, users, memory, command, curvature, settings.ego, settings.other, settings.dt)
     steered = steering
     if command.slip != wish.slip:
-        steered = np.arctan(2.0 * np.tan(command.slip))
+        steered = arctan(2.0 * tan(command.slip))
     if settings.overrides:
         car.acceleration, car.steering = command.acceleration, steered
     _count(episode, step, report, pairs, broken, settings.overrides)

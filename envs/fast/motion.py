@@ -4,6 +4,7 @@ import numpy as np
 
 from envs.fast.compiled import merged
 from envs.fast.state import DIRECT, TRAFFIC
+from envs.fast.ufuncs import arctan_each, tan_each
 
 
 @merged
@@ -42,8 +43,14 @@ def move(cars, n_vehicles, sight, dt, max_speed, min_speed):
         _displace(car, car.cos, car.sin, dt)
         car.speed += car.acceleration * dt
     for b in range(turning):
+        sight.x[b] = cars[sight.some[b]].steering
+    tan_each(sight.x, sight.y, turning)
+    for b in range(turning):
+        sight.x[b] = 0.5 * sight.y[b]
+    arctan_each(sight.x, sight.y, turning)
+    for b in range(turning):
         car = cars[sight.some[b]]
-        slip = np.arctan(0.5 * np.tan(car.steering))
+        slip = sight.y[b]
         _displace(car, np.cos(car.heading + slip), np.sin(car.heading + slip), dt)
         if slip != 0.0:
             set_heading(car, car.heading + car.speed * np.sin(slip) / (car.length / 2) * dt)

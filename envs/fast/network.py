@@ -14,6 +14,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 from envs.fast.compiled import callable_too, compiled, merged
 from envs.fast.floats import dot, norm, wrap_to_pi
 from envs.fast.state import CAR_LENGTH
+from envs.fast.ufuncs import arctan, arctan2
 
 STRAIGHT, SINE, CIRCULAR = range(3)
 
@@ -42,6 +43,10 @@ LANE = np.dtype(
         ("radius", "f8"),  # of a circle [m]
         ("start_phase", "f8"),  # [rad]
         ("turn", "f8"),  # +1 clockwise, -1 counter-clockwise
+        ("left", "f8"),  # range of its middle in x [m]
+        ("right", "f8"),
+        ("low", "f8"),  # and in y [m]
+        ("high", "f8"),
     ],
     align=True,
 )
@@ -152,7 +157,19 @@ def _lane(lane, road: int, index) -> np.ndarray:
         row["start_phase"], row["turn"] = lane.start_phase, lane.direction
     else:
         raise ValueError(f"lane {index} is a {type(lane).__name__}; expected StraightLane, SineLane or CircularLane")
+    (row["left"], row["low"]), (row["right"], row["high"]) = _range(lane, row)
     return row
+
+
+def _range(lane, row) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest x and y of the middle of a lane [m]."""
+    s = np.array([0.0, lane.length])
+    if isinstance(lane, CircularLane):  # there, and where it runs along an axis
+        crests = lane.direction * (np.arange(-8, 9) * np.pi / 2 - lane.start_phase) * lane.radius
+        s = np.append(s, crests[(crests > 0.0) & (crests < lane.length)])
+    points = np.array([lane.position(along, 0.0) for along in s])
+    # the crests of a sine lie within its amplitude of the line between its ends
+    return points.min(0) - row["amplitude"], points.max(0) + row["amplitude"]
 
 
 def _links(network, index, number, connected: bool):
@@ -193,8 +210,20 @@ def local_coordinates(lane, x, y):
     """Arc length and signed lateral offset of a point on a lane [m]."""
     dx, dy = x - lane.x, y - lane.y
     if lane.kind == CIRCULAR:
-        phi = wrap_to_pi(np.arctan2(dy, dx) - lane.start_phase) + lane.start_phase
-        return lane.turn * (phi - lane.start_phase) * lane.radius, lane.turn * (lane.radius - norm(dx, dy))
+        return around(lane, dx, dy, arctan2(dy, dx))
+    return beside(lane, dx, dy)
+
+
+@callable_too
+def around(lane, dx, dy, angle):
+    """`local_coordinates` on a circular lane, of a point given by its offset from the centre [m, rad]."""
+    phi = wrap_to_pi(angle - lane.start_phase) + lane.start_phase
+    return lane.turn * (phi - lane.start_phase) * lane.radius, lane.turn * (lane.radius - norm(dx, dy))
+
+
+@callable_too
+def beside(lane, dx, dy):
+    """`local_coordinates` on any other lane, of a point given by its offset from the start [m]."""
     s = dot(dx, dy, lane.dx, lane.dy)
     lateral = dot(dx, dy, lane.lx, lane.ly)
     if lane.kind == SINE:
@@ -221,8 +250,28 @@ def heading_at(lane, s):
         return lane.heading
     if lane.kind == SINE:
         slope = lane.amplitude * lane.pulsation * np.cos(lane.pulsation * s + lane.phase)
-        return lane.heading + np.arctan(slope)
+        return lane.heading + arctan(slope)
     return lane.turn * s / lane.radius + lane.start_phase + np.pi / 2 * lane.turn
+
+
+@merged
+def is_far(lane, x, y, across, along):
+    """Is a point more than `across` to the side of a lane, or more than `along` beyond its ends [m]? In doubt no.
+
+    Cheaper than `local_coordinates`. With `along` = 0 that also says that `distance` is more than `across`.
+    """
+    across += 1e-6
+    far = across + along  # who is nearer than that in lane coordinates is so on the plane
+    if (x < lane.left - far) | (x > lane.right + far) | (y < lane.low - far) | (y > lane.high + far):
+        return True
+    dx, dy = x - lane.x, y - lane.y
+    if lane.kind == STRAIGHT:
+        return abs(dx * lane.lx + dy * lane.ly) > across
+    if lane.kind == SINE:
+        return False
+    outer, inner = lane.radius + across, max(lane.radius - across, 0.0)
+    square = dx * dx + dy * dy
+    return (square > outer * outer) | (square < inner * inner)
 
 
 @merged

@@ -13,8 +13,9 @@ import numpy as np
 
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import wrap_to_pi
-from envs.fast.network import SINE, STRAIGHT, distance, heading_at, is_on_lane, local_coordinates
-from envs.fast.state import CAR
+from envs.fast.network import CIRCULAR, around, beside, distance, heading_at, is_far, is_on_lane, local_coordinates
+from envs.fast.state import CAR, CAR_LENGTH
+from envs.fast.ufuncs import arctan2_each
 from envs.intent import CAR_ON_ROAD
 from shield.junction import SAMPLE
 from shield.plans import THREAT
@@ -36,6 +37,9 @@ class Sight(NamedTuple):
     others: np.ndarray  # `[N]` the others
     free: np.ndarray  # `[N]` accelerations on a free road [m/s^2]
     wanted: np.ndarray  # `[N]` accelerations decided on [m/s^2]
+    x: np.ndarray  # `[N]` numbers of the step at hand
+    y: np.ndarray  # `[N]`
+    z: np.ndarray  # `[N]`
     pairs: np.ndarray  # `[N (N - 1) / 2]` pairs that may collide
     corners: np.ndarray  # `[2, 4, 2]` of two boxes [m]
     nearest: np.ndarray  # `[N]` observed cars
@@ -62,6 +66,9 @@ def make_sight(n_lanes, n, speeds, lanes, times):
         np.empty(n, np.int64),
         np.empty(n),
         np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
         np.empty(max(n * (n - 1) // 2, 1), np.int64),
         np.empty((2, 4, 2)),
         np.empty(n, np.int64),
@@ -86,9 +93,16 @@ def project(cars, n, net, sight):
                 s[i], lateral[i] = cars[i].x, cars[i].y - y
         return
     for k in range(len(net.lanes)):
-        lane = net.lanes[k]
-        for i in range(n):
-            sight.s[k, i], sight.lateral[k, i] = local_coordinates(lane, cars[i].x, cars[i].y)
+        lane, s, lateral, x, y = net.lanes[k], sight.s[k], sight.lateral[k], sight.x, sight.y
+        if lane.kind == CIRCULAR:
+            for i in range(n):
+                x[i], y[i] = cars[i].x - lane.x, cars[i].y - lane.y
+            arctan2_each(y, x, sight.z, n)
+            for i in range(n):
+                s[i], lateral[i] = around(lane, x[i], y[i], sight.z[i])
+        else:
+            for i in range(n):
+                s[i], lateral[i] = beside(lane, cars[i].x - lane.x, cars[i].y - lane.y)
 
 
 @merged
@@ -102,15 +116,23 @@ def update_lanes(cars, n, net, sight):
         bound = _far_from(car, i, car.lane, lanes, sight)
         near = 0
         for k in range(len(lanes)):
-            near += distance(lanes[k], sight.s[k, i], sight.lateral[k, i]) <= bound  # the angle would only add to it
+            near += not _is_beyond(bound, i, k, lanes, sight)
         if near == 1:
             continue
         best, nearest = np.inf, 0
         for k in range(len(lanes)):
+            if _is_beyond(bound, i, k, lanes, sight):
+                continue
             far = _far_from(car, i, k, lanes, sight)
             if far < best:
                 best, nearest = far, k
         car.lane = nearest
+
+
+@merged
+def _is_beyond(bound, i, k, lanes, sight):
+    """Is a car farther than `bound` from lane `k`, in position alone [m]? The angle only adds to it."""
+    return distance(lanes[k], sight.s[k, i], sight.lateral[k, i]) > bound
 
 
 @merged
@@ -131,16 +153,19 @@ def place(cars, n, lanes, sight):
         car = cars[i]
         x, y = car.x, car.y
         lane = lanes[car.lane]
-        s, lateral = local_coordinates(lane, x, y)
+        here, aside = local_coordinates(lane, x, y)
         # no lane farther away than the one of before can be the nearest
-        bound = distance(lane, s, lateral) + abs(wrap_to_pi(car.heading - heading_at(lane, s)))
+        bound = distance(lane, here, aside) + abs(wrap_to_pi(car.heading - heading_at(lane, here)))
         best, nearest, on = np.inf, 0, 0
         for k in range(len(lanes)):
             lane = lanes[k]
-            if _is_far(lane, x, y, max(bound, lane.width / 2 + 1.0) + 1e-6):
+            if is_far(lane, x, y, max(bound, lane.width / 2 + 1.0), CAR_LENGTH):
                 sight.s[k, i] = np.nan
                 continue
-            s, lateral = local_coordinates(lane, x, y)
+            if k != car.lane:
+                s, lateral = local_coordinates(lane, x, y)
+            else:
+                s, lateral = here, aside
             sight.s[k, i], sight.lateral[k, i] = s, lateral
             if is_on_lane(lane, s, lateral, 1.0):
                 on |= 1 << k
@@ -151,22 +176,6 @@ def place(cars, n, lanes, sight):
                     best, nearest = far, k
         car.lane = nearest
         sight.on[i] = on
-
-
-@compiled
-def _is_far(lane, x, y, reach):
-    """Is a point farther than `reach` from the endless line or full circle of a lane [m]? In doubt no."""
-    dx, dy = x - lane.x, y - lane.y
-    if lane.kind == STRAIGHT:
-        return abs(dx * lane.lx + dy * lane.ly) > reach
-    if lane.kind == SINE:
-        return False
-    outer = lane.radius + reach
-    if abs(dx) > outer or abs(dy) > outer:
-        return True
-    inner = max(lane.radius - reach, 0.0)
-    square = dx * dx + dy * dy
-    return square > outer * outer or square < inner * inner
 
 
 @merged
