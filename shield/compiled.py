@@ -9,8 +9,9 @@ from typing import Any
 import numba
 import numpy as np
 from numba import types
-from numba.core.registry import CPUDispatcher
 from numba.extending import overload
+
+from shield.parts import also_outside, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
 UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -24,26 +25,9 @@ def fingerprint(*more: Path) -> str:
     return digest.hexdigest()
 
 
-class Inner(CPUDispatcher):
-    """A function that exists inside other compiled functions only.
-
-    What calls from Python would need (to unpack each field of each argument) makes up a good part of the
-    machine code, and of the time it takes to compile.
-    """
-
-    def __call__(self, *arguments: Any, **named: Any) -> Any:
-        raise TypeError(f"{self.py_func.__name__} can only be called from compiled code")
-
-
 def inner(function: Callable[..., Any], **options: Any) -> Any:
     """`compiled` for what is called from compiled functions only; it becomes a part of each."""
     return only_inside(_njit(error_model="numpy", _nrt=False, **UNWRAPPED, **options)(function))
-
-
-def only_inside(dispatcher: Any) -> Any:
-    """Keep Python from calling a function that was compiled `UNWRAPPED`; it would crash."""
-    dispatcher.__class__ = Inner
-    return dispatcher
 
 
 def inner_merged(function: Callable[..., Any]) -> Any:
@@ -77,11 +61,11 @@ def compiled_for_arrays(function: Callable[..., Any]) -> Any:
 
 
 def _stamped(dispatcher: Any) -> Any:
-    return cached_for(dispatcher, _stamp(Path(dispatcher.py_func.__code__.co_filename).parent))
+    return also_outside(cached_for(dispatcher, _stamp(Path(dispatcher.py_func.__code__.co_filename).parent)))
 
 
 def cached_for(dispatcher: Any, sources: str) -> Any:
-    """Let what is cached on disk count only for the sources that a `fingerprint` stands for."""
+    """Let what is cached on disk of a function count only for the sources that a `fingerprint` stands for."""
     index = dispatcher._cache._cache_file
     index._source_stamp = sources
     # compared before anything else is read, which may name types that are no more

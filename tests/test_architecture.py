@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 MAY_IMPORT = {
     "shield": {"numpy", "numba"},
-    "envs": {"shield", "gymnasium", "highway_env", "numba", "numpy", "pettingzoo"},
+    "envs": {"shield", "gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo"},
     "agents": {"gymnasium", "stable_baselines3", "torch", "numpy"},
     "eval": {"numpy", "scipy", "pandas", "matplotlib", "rich", "tqdm"},
 }

@@ -13,7 +13,7 @@ import shield
 from envs.fast.compiled import sources
 from envs.fast.engine import run
 from envs.fast.floats import norm
-from shield.compiled import cached_for, inner, inner_merged, larger, smaller
+from shield.compiled import cached_for, compiled, inner, inner_merged, larger, smaller
 from shield.plans import step
 
 
@@ -31,6 +31,26 @@ def _thrice(x):
 def test_functions_for_compiled_callers_say_so(function):
     with pytest.raises(TypeError, match=f"{function.py_func.__name__} can only be called from compiled code"):
         function(1.0)
+
+
+@compiled
+def _outside(x):
+    return 5.0 * x
+
+
+@inner
+def _through(x):
+    return _twice(_outside(x))
+
+
+@pytest.mark.parametrize("first", ["from Python", "from an inner function"])
+def test_python_calls_what_inner_functions_call_too(first):
+    """Inner functions have no machine code, and what one of them called first has its own all the same."""
+    number = {"from Python": 3, "from an inner function": 3.0}[first]  # a type each, so that both are first calls
+    if first == "from Python":
+        assert _outside(number) == 15.0
+    assert numba.njit(lambda x: _through(x))(number) == 30.0
+    assert _outside(number) == 15.0
 
 
 def _parts(dispatcher, found):

@@ -7,7 +7,8 @@ from typing import Any
 
 import numba
 
-from shield.compiled import UNWRAPPED, cached_for, fingerprint, only_inside
+from shield.compiled import UNWRAPPED, cached_for, fingerprint
+from shield.parts import also_outside, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
 _config: Any = numba.config
@@ -16,12 +17,13 @@ _config: Any = numba.config
 # Counting would cost far more than what they compute.
 _inner = {"_nrt": False, "error_model": "numpy"}
 
-# What Python calls as well, outside the loops.
-callable_too = _njit(**_inner, forceinline=True)
-
-# The same for what has one caller only: it becomes part of its source and is never compiled alone,
-# which saves compile time.
+# What has one caller only becomes part of its source and is never compiled alone, which saves compile time.
 unfolded = _njit(**_inner, inline="always")
+
+
+def callable_too(function):
+    """What Python calls as well, outside the loops."""
+    return also_outside(_njit(**_inner, forceinline=True)(function))
 
 
 def compiled(function):
@@ -43,7 +45,7 @@ def kernel(function):
     As in `shield.compiled`, any change in what the kernel may be made of compiles it anew.
     """
     dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **_inner)(function)
-    return cached_for(dispatcher, fingerprint(*sources()))
+    return also_outside(cached_for(dispatcher, fingerprint(*sources())))
 
 
 def sources() -> list[Path]:
