@@ -3,8 +3,8 @@
     python tests/fast/parity.py --episodes 100
     NPY_DISABLE_CPU_FEATURES=X86_V4 python tests/fast/parity.py --episodes 100
 
-The second form takes numpy's AVX-512 functions from highway-env, which differ from the C library's by
-one unit in the last place; then every episode must be equal to the last bit.
+The second form takes numpy's AVX-512 functions, which differ from the C library's by one unit in the
+last place, from both. Every episode is equal to the last bit with either.
 """
 
 import argparse
