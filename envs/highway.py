@@ -19,6 +19,7 @@ from shield.params import RSSParams, Rules
 from shield.plans import ANY
 from shield.response import LAT, LON, MEMORY, catch_up, forget_safe
 
+MAX_SLIP = float(np.arctan(np.tan(ControlledVehicle.MAX_STEERING_ANGLE) / 2))  # of a car's centre [rad]
 _JOIN = 0.5  # lane ends closer than this belong together [m]
 _CHAIN = 8  # lanes followed in either direction
 _SAMPLE = 2.0  # spacing of the pieces that stand in for a curve of changing curvature [m]
@@ -168,7 +169,7 @@ class ShieldedEgo:
     def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
         self.vehicle = vehicle
         self.settings = settings
-        self.body = (vehicle.LENGTH / 2, float(np.arctan(np.tan(ControlledVehicle.MAX_STEERING_ANGLE) / 2)))
+        self.body = (vehicle.LENGTH / 2, MAX_SLIP)
         self.nominal = dict(vehicle.action)
         self.others: list = []
         self.keys: list[int] = []

@@ -7,7 +7,6 @@ decision and writes the command back.
 from typing import NamedTuple
 
 import numpy as np
-from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.fast.collisions import is_near, overlap
 from envs.fast.compiled import compiled, merged
@@ -15,7 +14,7 @@ from envs.fast.floats import norm
 from envs.fast.network import Network, heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from envs.fast.ufuncs import arctan, tan
-from envs.highway import road_through
+from envs.highway import MAX_SLIP, road_through
 from envs.intent import Junction, Roads, is_outside, list_threats, no_roads, track_of
 from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
@@ -112,8 +111,7 @@ def make_watch(heading_bound):
     boxes[0, 0], boxes[0, 1] = CAR_LENGTH, CAR_WIDTH
     boxes[0, 2], boxes[0, 3] = largest_half_extents(CAR_LENGTH, CAR_WIDTH, heading_bound)
     boxes[1, 0], boxes[1, 1] = OBSTACLE_SIZE, OBSTACLE_SIZE
-    max_slip = float(np.arctan(np.tan(ControlledVehicle.MAX_STEERING_ANGLE) / 2))
-    return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING), max_slip)
+    return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING), MAX_SLIP)
 
 
 # Of the next two one is None, and numba leaves out of the kernel what it would need.
