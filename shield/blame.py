@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shield.command import Command
-from shield.compiled import compiled, compiled_for_arrays, inner
+from shield.compiled import apart, compiled, compiled_for_arrays, inner
 from shield.kinematics import forward_reach, speed_envelope, travel
 from shield.lateral import approach_no_credit, lateral_euler_margin
 from shield.longitudinal import euler_margin
@@ -239,7 +239,7 @@ class Verdict(NamedTuple):
     other_excess: float
 
 
-@compiled
+@apart
 def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     """Verdict at the first contact of the ego with one road user (Def. 27).
 

@@ -11,10 +11,12 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from shield.parts import also_outside, only_inside
+from shield.parts import UNWRAPPED, also_outside, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
-UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_PLAIN = {"_nrt": False, "error_model": "numpy"}
+# said of every function: numba would else give it what its first compiled caller has
+_MERGED, _APART = {"forceinline": True}, {"forceinline": False}
 
 
 def fingerprint(*more: Path) -> str:
@@ -25,14 +27,9 @@ def fingerprint(*more: Path) -> str:
     return digest.hexdigest()
 
 
-def inner(function: Callable[..., Any], **options: Any) -> Any:
-    """`compiled` for what is called from compiled functions only; it becomes a part of each."""
-    return only_inside(_njit(error_model="numpy", _nrt=False, **UNWRAPPED, **options)(function))
-
-
-def inner_merged(function: Callable[..., Any]) -> Any:
-    """`inner`, and merged into its callers: handing over tables by value would cost more than the work."""
-    return inner(function, forceinline=True)
+def inner(function: Callable[..., Any]) -> Any:
+    """`compiled` for what is called from compiled functions only."""
+    return only_inside(_njit(**_PLAIN, **UNWRAPPED, **_MERGED)(function))
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -45,19 +42,20 @@ def compiled(function: Callable[..., Any]) -> Any:
     elsewhere it would go on with the old code. A shield must never do that, so any change in the
     package, or in that of the function, compiles everything anew.
     """
-    return _stamped(_njit(cache=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True)(function))
+    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **_PLAIN, **_MERGED)(function))
 
 
-def merged(function: Callable[..., Any]) -> Any:
-    """`compiled`, and merged into compiled callers."""
-    return _stamped(
-        _njit(cache=True, error_model="numpy", _nrt=False, no_cfunc_wrapper=True, forceinline=True)(function)
-    )
+def apart(function: Callable[..., Any]) -> Any:
+    """`compiled`, but a function of its own in compiled callers too; `compiled` ones are merged into them.
+
+    For what is large and rarely called: one huge function takes far longer to translate than several.
+    """
+    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **_PLAIN, **_APART)(function))
 
 
 def compiled_for_arrays(function: Callable[..., Any]) -> Any:
     """`compiled` for what also takes whole arrays, or makes them."""
-    return _stamped(_njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function))
+    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, error_model="numpy", **_MERGED)(function))
 
 
 def _stamped(dispatcher: Any) -> Any:

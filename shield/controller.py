@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shield.command import Command
-from shield.compiled import compiled, inner, inner_merged, merged
+from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
 from shield.pair import assess, leading_speed, least_margin, own_share, toward
 from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, remember
@@ -40,7 +40,7 @@ class Body(NamedTuple):
     curvature: float  # of the lane at the ego, positive turns right [1/m]
 
 
-@merged
+@compiled
 def shield_frame(ego, users, ego_before, users_before, memory, nominal, body, ego_params, other_params, rules, dt):
     """Restrict the ego's nominal command to what RSS permits on this frame.
 
@@ -106,7 +106,7 @@ def shield_frame(ego, users, ego_before, users_before, memory, nominal, body, eg
     )
 
 
-@inner_merged
+@inner
 def _may_be_next(ego, user, ttc, rules):
     """May this user, driving the same way, be ahead in the way of the ego and nearer in time than `ttc` [s]?"""
     if user.s < ego.s or signed_gap(user.y - ego.y, ego.half_width, user.half_width) >= 0.0:
@@ -174,7 +174,7 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     return min(max(slip, low), high)
 
 
-@inner_merged
+@inner
 def _is_permitted(course, psi_next, v, v_next, drift, bounds, rules):
     """Do course and next heading [rad] keep all bounds? The bounds in closed form, without solving for the slip."""
     if abs(course) >= _STEEP or abs(psi_next) >= _STEEP:

@@ -15,7 +15,7 @@ that they do not meet. The judge looks at everybody.
 
 import numpy as np
 
-from shield.compiled import compiled, inner, inner_merged
+from shield.compiled import compiled, inner
 from shield.conflict_areas import CELL, X, Y, cell_of
 
 ALL, TABLE, GEOFENCE, WALK, FIRST_CONFLICTING, FIRST = range(6)
@@ -76,7 +76,7 @@ def _thin_out(paths, track, threats):
                 threat.left_out = True
 
 
-@inner_merged
+@inner
 def _meets_path(paths, track, threat, slack):
     """Is any of the ego's path ahead, or of the lane that it is leaving, in the way of a road user's?"""
     here = cell_of(track.s - slack, paths.cells[track.path])
@@ -87,7 +87,7 @@ def _meets_path(paths, track, threat, slack):
     return meets
 
 
-@inner_merged
+@inner
 def _is_on_way(paths, track, threat):
     """Is a road user on a lane of the ego's path?"""
     lane = paths.lane[threat.path, cell_of(threat.s, paths.cells[threat.path])]
@@ -107,7 +107,7 @@ def _to_meeting(paths, track, threat):
     return np.inf, np.inf
 
 
-@inner_merged
+@inner
 def _arrival(distance, speed):
     """Time to a place ahead at unchanged motion [s]."""
     if distance <= 0.0:

@@ -7,7 +7,7 @@ cosine and sine of the start heading. y points to the right of the driving direc
 
 import numpy as np
 
-from shield.compiled import compiled, inner, inner_merged, merged
+from shield.compiled import compiled, inner
 
 PIECE_FIELDS = 8
 X, Y, HEADING, CURVATURE, LENGTH, ARC_START, COS, SIN = range(PIECE_FIELDS)
@@ -26,7 +26,7 @@ def wrap_angle(angle):
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
-@inner_merged
+@inner
 def _on_piece(piece, x, y):
     """Arc length from the start of a piece, signed lateral offset [m] and heading of the lane there [rad]."""
     dx, dy = x - piece[X], y - piece[Y]
@@ -60,7 +60,7 @@ def locate(road, x, y):
     return s, lateral, heading, road[k, CURVATURE] if k >= 0 else 0.0
 
 
-@merged
+@compiled
 def nearest_piece(road, x, y):
     """As `locate`, but with the index of the piece; -1 on the tangent beyond a curved end."""
     if len(road) == 1 and abs(road[0, CURVATURE]) < _STRAIGHT:
@@ -109,7 +109,7 @@ def half_extents(length, width, heading):
     return turned_half_extents(length, width, np.cos(heading), np.sin(heading))
 
 
-@merged
+@compiled
 def turned_half_extents(length, width, cos, sin):
     """`half_extents` by the cosine and sine of the heading."""
     cos, sin = np.abs(cos), np.abs(sin)

@@ -29,7 +29,7 @@ from shield.blame import (
     WAVERED,
     Verdict,
 )
-from shield.compiled import compiled, inner, inner_merged, merged
+from shield.compiled import apart, compiled, inner
 from shield.conflict_areas import CELL, boxes_overlap, cell_of
 from shield.controller import RESPONSE_BRAKE, RESPONSE_GO
 from shield.examined import TABLE, count_examined, examine, is_left_out
@@ -121,7 +121,7 @@ class JunctionReport(NamedTuple):
     possible: int  # all road users
 
 
-@compiled
+@apart
 def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides, holds=False):
     """Restrict the ego's acceleration to what leaves it a plan, and judge everybody.
 
@@ -169,7 +169,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
     )
 
 
-@compiled
+@apart
 def has_plan(scene, memory, entry, at_line):
     """Would braking now, or going on, stay clear of everybody? Asked before a lane change.
 
@@ -188,7 +188,7 @@ def has_plan(scene, memory, entry, at_line):
     )
 
 
-@merged
+@compiled
 def limit(a, v, ego, dt):
     """Limits that always hold: never harder than the parameters say, never backwards [m/s^2]."""
     a = min(max(a, -ego.a_max_brake), ego.a_max_accel, max((ego.v_cap - v) / dt, 0.0))
@@ -213,7 +213,7 @@ def sort_out(scene, memory, entry):
                 memory[threat.user].relied = True
 
 
-@merged
+@compiled
 def is_follower(scene, threat, established):
     """Does a road user drive behind the ego on its way, or is it behind on a way that has just parted from it?
 
@@ -228,7 +228,7 @@ def is_follower(scene, threat, established):
     return from_ego >= 0 and from_ego == from_other and track.s - entered_ego - (threat.s - entered_other) > bodies
 
 
-@inner_merged
+@inner
 def _entered(paths, path, s):
     """Where on a path a driver at `s` headed for its lane [m], and the lane before, -1 = none."""
     first = paths.reached[path, cell_of(s, paths.cells[path])]
@@ -255,7 +255,7 @@ def _choose(scene, plan, a, at_line, holds):
     return _escape(scene, plan, go_now, brake)
 
 
-@inner
+@apart
 def _escape(scene, plan, go_now, brake):
     """Somebody left their bounds, or appeared: a plan that stays clear of everybody, or for longest."""
     stop_at = stop_conflict(scene, brake, EVERYBODY, ANYWHERE, 0.0)
@@ -276,7 +276,7 @@ def _escape(scene, plan, go_now, brake):
     return (limit(-ego.a_max_brake, track.v, ego, scene.dt) if hard_at > stop_at else brake), False, True
 
 
-@inner
+@apart
 def _least_harm(scene, a, users):
     """Of what is left to a trapped ego, what breaks the fewest duties; braking if that breaks no more [m/s^2]."""
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
@@ -291,7 +291,7 @@ def _least_harm(scene, a, users):
     return best
 
 
-@inner
+@apart
 def _duties_broken(scene, a, users):
     """How many road users would an acceleration leave no plan toward, though there is one now?
 
@@ -366,7 +366,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     return dangerous, kept
 
 
-@inner_merged
+@inner
 def _alone_with(scene, i):
     """The scene without the ways of others before and after those of a road user, which stand together."""
     first, last = len(scene.threats), 0
@@ -376,7 +376,7 @@ def _alone_with(scene, i):
     return Scene(scene.paths, scene.track, scene.threats[first:last], scene.ego, scene.other, scene.dt, scene.drift)
 
 
-@inner_merged
+@inner
 def _judge_motion(sample, memory, other, dt):
     """Did a road user leave the bounds that plans assume, since the last sample?"""
     if memory.age == 0:
@@ -401,7 +401,7 @@ def _judge_motion(sample, memory, other, dt):
         memory.other_broke, memory.other_excess = duty, excess
 
 
-@inner_merged
+@inner
 def _is_behind(scene, i, established):
     """Does a road user follow the ego, whatever way it takes, and at a safe distance (Lemma 2)?"""
     behind, safe, other = False, True, scene.other
@@ -419,7 +419,7 @@ def _is_behind(scene, i, established):
     return behind, safe
 
 
-@inner
+@apart
 def _plans_now(scene, i):
     """Kinds of plans that stay clear of one road user from this sample on."""
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
@@ -428,7 +428,7 @@ def _plans_now(scene, i):
     return GO if go_plan(scene, throttle(scene, scene.track.s, scene.track.v), i, ANYWHERE, 0.0)[0] >= 0 else 0
 
 
-@inner
+@apart
 def _is_kept(scene, i, a, items):
     """Does the ego's acceleration leave it a plan? Where there is none, does it brake or go on with all it has?"""
     if items == 0:
@@ -438,7 +438,7 @@ def _is_kept(scene, i, a, items):
     return stop_conflict(scene, a, i, ANYWHERE, 0.0) == NEVER or go_plan(scene, a, i, ANYWHERE, 0.0)[0] >= 0
 
 
-@compiled
+@apart
 def judge_crossing(sample, memory, outside, other, dt):
     """Verdict at the first contact with one road user (Def. 27).
 
@@ -475,7 +475,7 @@ def judge_crossing(sample, memory, outside, other, dt):
     )
 
 
-@inner_merged
+@inner
 def _ttc(scene):
     """Time to collision with a slower road user ahead on the ego's lane [s]; inf if there is none."""
     ttc, track = np.inf, scene.track

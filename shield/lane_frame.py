@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from shield.compiled import compiled, merged
+from shield.compiled import compiled
 from shield.geometry import COS, CURVATURE, HEADING, SIN, nearest_piece, turned_half_extents, wrap_angle
 
 
@@ -12,7 +12,7 @@ def same_frame(road: np.ndarray, other: np.ndarray) -> bool:
     return straight and bool(np.ptp(np.concatenate([road[:, HEADING], other[:, HEADING]])) < 1e-9)
 
 
-@merged
+@compiled
 def to_lane_frame(road, x, y, heading, speed, cos, sin, x_before, y_before, box, dt, user):
     """Fill in what one `ROAD_USER` record says about motion and size.
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, inner, inner_merged, merged
+from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
 from shield.kinematics import reach, stopping_distance
 from shield.lateral import approach_no_credit, d_min_no_credit, d_min_of_pair, lateral_euler_margin
@@ -51,7 +51,7 @@ class Pair(NamedTuple):
     w_other: float
 
 
-@merged
+@compiled
 def toward(side, user):
     """Lateral speed toward `side`: the larger of the last frame's and the one the heading commits to [m/s].
 
@@ -60,7 +60,7 @@ def toward(side, user):
     return max(side * user.u, side * user.speed * user.sin)
 
 
-@merged
+@compiled
 def assess(ego, user, ego_params, other_params, rules, dt):
     """Evaluate both axes of one pair on one frame.
 
@@ -108,7 +108,7 @@ def assess(ego, user, ego_params, other_params, rules, dt):
     )
 
 
-@merged
+@compiled
 def own_share(user, params, dt):
     """What a follower may need of the distance of Def. 1: (its way to rest, its margins) [m].
 
@@ -121,7 +121,7 @@ def own_share(user, params, dt):
     return way, params.standstill_gap + euler_margin(user.speed, b, dt)
 
 
-@merged
+@compiled
 def least_margin(ego, user, share_ego, ego_params, other_params, rules, dt):
     """Lower bound of `Pair.margin_lon` at a fraction of the price of `assess` [m]; -inf where none is known.
 
@@ -140,7 +140,7 @@ def least_margin(ego, user, share_ego, ego_params, other_params, rules, dt):
     return signed_gap(user.s - ego.s, ego.half_length, user.half_length) - (max(way, 0.0) + margins)
 
 
-@inner_merged
+@inner
 def _credit(v_front, rear, front):
     """The leader's own way to rest [m]; 0 if the cars may be closest before they stand."""
     if rear.a_min_brake > front.a_max_brake:
@@ -148,7 +148,7 @@ def _credit(v_front, rear, front):
     return stopping_distance(1.0, front.a_max_brake) * v_front**2  # the first factor is the same for all leaders
 
 
-@merged
+@compiled
 def leading_speed(user, rules):
     """Least speed along the lane that a leader is expected to have [m/s].
 
@@ -166,13 +166,13 @@ def sampled_approach(w, car, dt):
     return approach_no_credit(w, car) + sampling_margin(w, car, dt)
 
 
-@merged
+@compiled
 def sampling_margin(w, car, dt):
     """What sampling every `dt` adds to that, w >= 0 [m]."""
     return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8
 
 
-@inner_merged
+@inner
 def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt):
     """Speeds along the lane as Def. 1 or 2 must assume them, and the required gap."""
     # A follower may turn back into the lane at any time: its whole speed counts.

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, inner, inner_merged, merged
+from shield.compiled import compiled, inner
 from shield.conflict_areas import CELL, Paths, cell_of, in_conflict
 from shield.kinematics import response_distance, stopping_distance, travel
 from shield.longitudinal import d_min_following
@@ -99,7 +99,7 @@ class Scene(NamedTuple):
 # ---------------------------------------------------------------- where others may be
 
 
-@inner_merged
+@inner
 def nearest(threat, t, other):
     """Least arc length at which a road user can be `t` from now [m]."""
     if threat.wreck:
@@ -110,7 +110,7 @@ def nearest(threat, t, other):
     return threat.s + driven - _short_cut(driven)
 
 
-@merged
+@compiled
 def farthest(threat, t, other):
     """Largest arc length at which it can be `t` from now [m]."""
     if threat.wreck:
@@ -121,7 +121,7 @@ def farthest(threat, t, other):
     return threat.s + driven + _short_cut(driven)
 
 
-@inner_merged
+@inner
 def _beyond_line(t, other):
     """How far behind a stop line a car can be `t` after it may go, if until then it was able to stop there [m].
 
@@ -130,13 +130,13 @@ def _beyond_line(t, other):
     return 0.5 * (other.a_max_accel + other.a_min_brake) * t**2
 
 
-@inner_merged
+@inner
 def _short_cut(driven):
     """How far progress along a path may differ from the distance driven [m]."""
     return min(_SHORT_CUT_SHARE * driven, _SHORT_CUT)
 
 
-@inner_merged
+@inner
 def fastest(threat, t, other):
     """Largest speed it can have `t` from now [m/s]."""
     return max(threat.v, min(threat.v + other.a_max_accel * t, threat.cap), 0.0)
@@ -145,7 +145,7 @@ def fastest(threat, t, other):
 # ---------------------------------------------------------------- the ego and one of them
 
 
-@inner_merged
+@inner
 def follows(scene, s, v, threat, t):
     """Would a road user be behind the ego, at `s` with speed `v`, on its lane by then, at a safe distance (Lemma 2)?"""
     track, other = scene.track, scene.other
@@ -156,13 +156,13 @@ def follows(scene, s, v, threat, t):
     return gap > 0.0 and gap >= distance_behind(threat, fastest(threat, t, other), v, other)
 
 
-@inner_merged
+@inner
 def _shares_lane(paths, path, s, threat):
     """Does the way of a road user run along the lane that the ego is on at `s`?"""
     return not np.isnan(paths.offset[threat.path, paths.lane[path, cell_of(s, paths.cells[path])]])
 
 
-@inner_merged
+@inner
 def distance_behind(threat, v_threat, v, other):
     """Distance that a follower has to keep (Lemma 2) [m]; beyond the speed limit it does not accelerate."""
     rear = RSSParams(
@@ -180,7 +180,7 @@ def distance_behind(threat, v_threat, v, other):
     return d_min_following(v_threat, v, rear, other)
 
 
-@inner_merged
+@inner
 def on_path_of_ego(paths, path, s, threat, s_threat):
     """Arc length of a road user as the ego counts it, inf where it does not drive along the ego's lane [m]."""
     lane = paths.lane[path, cell_of(s, paths.cells[path])]
@@ -191,13 +191,13 @@ def on_path_of_ego(paths, path, s, threat, s_threat):
     return s_other if s_other >= s or _comes_from_behind(paths, path, s, threat, s_threat, s - s_other) else np.inf
 
 
-@inner_merged
+@inner
 def _comes_from_behind(paths, path, s, threat, s_threat, distance):
     """Does a road user at `distance` [m] behind the ego not come in its way before? On a ring everybody is behind."""
     return paths.first[path, threat.path, cell_of(s, paths.cells[path])] - s_threat >= distance - _BODIES
 
 
-@inner_merged
+@inner
 def behind_by(paths, track, threat):
     """How far a road user on the ego's own way is behind it; -inf if it is not on it [m]."""
     lane = paths.lane[threat.path, cell_of(threat.s, paths.cells[threat.path])]
@@ -209,7 +209,7 @@ def behind_by(paths, track, threat):
     return distance if distance <= 0.0 or clear else -np.inf
 
 
-@inner_merged
+@inner
 def meets(scene, s, slack, threat, t, resting):
     """Can a road user be in the way of the ego at `s`, at time `t` from now or, if it rests, ever after?
 
@@ -230,13 +230,13 @@ def meets(scene, s, slack, threat, t, resting):
     )
 
 
-@inner_merged
+@inner
 def _overlaps(paths, path, s, slack, from_cell, to_cell):
     """Is the ego in one of these cells of a path?"""
     return from_cell <= cell_of(s + slack, paths.cells[path]) and cell_of(s - slack, paths.cells[path]) <= to_cell
 
 
-@inner_merged
+@inner
 def _conflicts(paths, path, s, slack, other_path, low, high):
     """Is the ego, on a path, in the way of somebody between `low` and `high` on another [m]?"""
     for i in range(cell_of(s - slack, paths.cells[path]), cell_of(s + slack, paths.cells[path]) + 1):
@@ -283,13 +283,13 @@ def look_ahead(scene, threat):
 # ---------------------------------------------------------------- plans
 
 
-@inner_merged
+@inner
 def step(s, v, a, dt):
     """One frame of explicit Euler, never backwards."""
     return s + v * dt, max(v + a * dt, 0.0)
 
 
-@merged
+@compiled
 def throttle(scene, s, v):
     """Acceleration of a plan's throttle phase: up to the speed limit [m/s^2]."""
     paths, path, ego = scene.paths, scene.track.path, scene.ego
@@ -297,7 +297,7 @@ def throttle(scene, s, v):
     return min(ego.a_max_accel, max((cap - v) / scene.dt, 0.0))
 
 
-@inner_merged
+@inner
 def _counts(threat, n, only):
     """Must a plan stay clear of a road user from frame n on, `only` being the one that counts, -1 = all?"""
     if threat.ignored or threat.left <= n:
@@ -305,7 +305,7 @@ def _counts(threat, n, only):
     return threat.user == only if only >= 0 else not threat.left_out
 
 
-@inner_merged
+@inner
 def _is_away(scene, s, n, threat):
     """Is a road user too far away on frame n to be in the way of the ego at `s` or behind it (see `look_ahead`)?"""
     return n < threat.free_until and cell_of(s, scene.paths.cells[scene.track.path]) < threat.joins
@@ -329,7 +329,7 @@ def _meets_anyone(scene, s, v, n, only, slack):
     return False
 
 
-@inner_merged
+@inner
 def begin(scene):
     """Nobody has become a follower yet."""
     for k in range(len(scene.threats)):
@@ -369,7 +369,7 @@ def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
     return conflict
 
 
-@inner_merged
+@inner
 def _meets_braking(scene, s, v, n, brake, until, slack, threat):
     """First frame from n on, before `until`, on which the braking ego meets a road user; `NEVER` if none.
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, inner, merged
+from shield.compiled import compiled, inner
 from shield.kinematics import speed_envelope
 from shield.pair import assess
 
@@ -71,7 +71,7 @@ def step_threshold(axes, since, safe_lon, safe_lat):
     return axes, since + 1
 
 
-@merged
+@compiled
 def remember(memory, pair, ego, user, dt):
     """Carry one pair's memory over to this sample, in place."""
     memory.axes, memory.since = step_threshold(memory.axes, memory.since, pair.safe_lon, pair.safe_lat)
@@ -98,7 +98,7 @@ def remember(memory, pair, ego, user, dt):
     memory.skipped = False
 
 
-@merged
+@compiled
 def catch_up(memory, ego_before, user_before, ego_params, other_params, rules, dt):
     """Take in the last sample, if it was skipped, in place. It is the threshold of a danger that begins now."""
     if memory.skipped:
@@ -250,7 +250,7 @@ CUT_IN_SPEED = 0.1  # a car ahead counts as cutting in when it comes closer at t
 CUT_IN_GAP = 0.3  # ... or is nearer than this across the lane [m]
 
 
-@merged
+@compiled
 def owes_braking(memory, pair, rules):
     """Must the ego brake for this pair? Returns the reason: 0 none, 1 Def. 4, 2 behind a cut-in (hole H6)."""
     if memory.since == 0:
@@ -269,7 +269,7 @@ def owes_lateral_stop(memory, rules):
     return rules.lateral and rules.memory and owes(memory, LAT)
 
 
-@merged
+@compiled
 def merge(bounds, memory, pair, params, rules, dt):
     """Tighten the bounds by what is owed to one pair.
 

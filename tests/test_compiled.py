@@ -13,7 +13,7 @@ import shield
 from envs.fast.compiled import sources
 from envs.fast.engine import run
 from envs.fast.floats import norm
-from shield.compiled import cached_for, compiled, inner, inner_merged, larger, smaller
+from shield.compiled import cached_for, compiled, inner, larger, smaller
 from shield.plans import step
 
 
@@ -22,12 +22,7 @@ def _twice(x):
     return 2.0 * x
 
 
-@inner_merged
-def _thrice(x):
-    return 3.0 * x
-
-
-@pytest.mark.parametrize("function", [_twice, _thrice, step, norm])
+@pytest.mark.parametrize("function", [_twice, step, norm])
 def test_functions_for_compiled_callers_say_so(function):
     with pytest.raises(TypeError, match=f"{function.py_func.__name__} can only be called from compiled code"):
         function(1.0)
@@ -45,7 +40,7 @@ def _through(x):
 
 @pytest.mark.parametrize("first", ["from Python", "from an inner function"])
 def test_python_calls_what_inner_functions_call_too(first):
-    """Inner functions have no machine code, and what one of them called first has its own all the same."""
+    """In compiled code a function is intermediate code; called from Python it has machine code all the same."""
     number = {"from Python": 3, "from an inner function": 3.0}[first]  # a type each, so that both are first calls
     if first == "from Python":
         assert _outside(number) == 15.0
@@ -55,9 +50,9 @@ def test_python_calls_what_inner_functions_call_too(first):
 
 def _parts(dispatcher, found):
     """All compiled functions that one is made of."""
-    function = dispatcher.py_func
-    if function not in found:
-        found.add(function)
+    if dispatcher not in found:
+        found.add(dispatcher)
+        function = dispatcher.py_func
         for name in function.__code__.co_names:
             part = function.__globals__.get(name)
             if hasattr(part, "py_func"):
@@ -65,8 +60,15 @@ def _parts(dispatcher, found):
     return found
 
 
+def test_every_function_says_whether_it_is_merged_into_its_callers():
+    """numba would else give it what its first compiled caller has, and what is large would be merged too."""
+    for function in _parts(run, set()):
+        options = function.targetoptions
+        assert "forceinline" in options or options.get("inline") == "always", function
+
+
 def test_a_change_in_any_file_that_the_kernel_is_made_of_compiles_it_anew():
-    files = {Path(function.__code__.co_filename) for function in _parts(run, set())}
+    files = {Path(function.py_func.__code__.co_filename) for function in _parts(run, set())}
     assert {file.name for file in files} >= {"engine.py", "guard.py", "intent.py", "plans.py"}
     assert files <= {*sources(), *Path(shield.__file__).parent.glob("*.py")}
 

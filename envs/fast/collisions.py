@@ -153,7 +153,7 @@ def overlap(first, second, corners, dt):
     return touches, will_touch, shortest * away_x, shortest * away_y
 
 
-@compiled
+@merged
 def _are_apart(first, second, dt):
     """Cheap and never wrong: does an axis of the first box part the two by a safe margin, moves included?
 
@@ -173,13 +173,13 @@ def _are_apart(first, second, dt):
     return _gap(far_along, move_along, along) > 1e-6 or _gap(far_across, move_across, across) > 1e-6
 
 
-@compiled
+@merged
 def _gap(far, step, half_sizes):
     """Gap on one axis between boxes `far` apart when the first one moves by `step` toward positive."""
     return max(far - max(step, 0.0), min(step, 0.0) - far) - half_sizes
 
 
-@compiled
+@merged
 def _fill_corners(car, corners):
     for p in range(4):
         along = -car.length / 2 if p < 2 else car.length / 2
@@ -188,12 +188,12 @@ def _fill_corners(car, corners):
         corners[p, 1] = car.sin * along + car.cos * across + car.y
 
 
-@compiled
+@merged
 def _mean(values):
     return (values[0] + values[1] + values[2] + values[3]) / 4
 
 
-@compiled
+@merged
 def _span(corners, nx, ny):
     """Interval that a box covers on an axis."""
     low = high = dot(corners[0, 0], corners[0, 1], nx, ny)
@@ -203,7 +203,7 @@ def _span(corners, nx, ny):
     return low, high
 
 
-@compiled
+@merged
 def _between(low_1, high_1, low_2, high_2):
     """Distance of two intervals, negative where they overlap."""
     return low_2 - high_1 if low_1 < low_2 else low_1 - high_2

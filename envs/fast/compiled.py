@@ -7,8 +7,8 @@ from typing import Any
 
 import numba
 
-from shield.compiled import UNWRAPPED, cached_for, fingerprint
-from shield.parts import also_outside, only_inside
+from shield.compiled import cached_for, fingerprint
+from shield.parts import UNWRAPPED, also_outside, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
 _config: Any = numba.config
@@ -16,6 +16,8 @@ _config: Any = numba.config
 # Inner functions allocate nothing, so numba need not count references to the arrays they are handed.
 # Counting would cost far more than what they compute.
 _inner = {"_nrt": False, "error_model": "numpy"}
+# said of every function: numba would else give it what its first compiled caller has
+_merged, _apart = {"forceinline": True}, {"forceinline": False}
 
 # What has one caller only becomes part of its source and is never compiled alone, which saves compile time.
 unfolded = _njit(**_inner, inline="always")
@@ -23,12 +25,15 @@ unfolded = _njit(**_inner, inline="always")
 
 def callable_too(function):
     """What Python calls as well, outside the loops."""
-    return also_outside(_njit(**_inner, forceinline=True)(function))
+    return also_outside(_njit(**_inner, **_merged)(function))
 
 
 def compiled(function):
-    """An inner function. It becomes a part of the kernel, which alone is cached, and is nothing to Python."""
-    return only_inside(_njit(**_inner, **UNWRAPPED)(function))
+    """An inner function. It becomes a part of the kernel, which alone is cached, and is nothing to Python.
+
+    Where it is large or called from several places, it stays a function of its own there.
+    """
+    return only_inside(_njit(**_inner, **UNWRAPPED, **_apart)(function))
 
 
 def merged(function):
@@ -36,7 +41,7 @@ def merged(function):
 
     Calls hand over tuples of arrays field by field, which may cost more than the work.
     """
-    return only_inside(_njit(**_inner, **UNWRAPPED, forceinline=True)(function))
+    return only_inside(_njit(**_inner, **UNWRAPPED, **_merged)(function))
 
 
 def kernel(function):
@@ -44,7 +49,7 @@ def kernel(function):
 
     As in `shield.compiled`, any change in what the kernel may be made of compiles it anew.
     """
-    dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **_inner)(function)
+    dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **_inner, **_apart)(function)
     return also_outside(cached_for(dispatcher, fingerprint(*sources())))
 
 

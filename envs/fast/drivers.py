@@ -137,7 +137,7 @@ def _is_in_traffic(car):
 # ---------------------------------------------------------------- the controlled vehicle
 
 
-@merged
+@compiled
 def take_meta_action(cars, i, action, net, lanes, sight, target_speeds):
     """Change the target speed or lane of the car, as `MDPVehicle.act` does with a label."""
     car = cars[i]
@@ -178,7 +178,7 @@ def follow_road(cars, i, net, lanes, sight):
         locate(k, i, cars, lanes, sight)
 
 
-@compiled
+@merged
 def route_length(net, route):
     """Number of steps of a route."""
     length = 0
@@ -187,7 +187,7 @@ def route_length(net, route):
     return length
 
 
-@compiled
+@merged
 def _next_lane(car, s, net, lanes):
     """Lane that continues the target lane: along the route, else the nearest one."""
     k = car.target_lane
@@ -215,7 +215,7 @@ def _next_lane(car, s, net, lanes):
     return nearest
 
 
-@compiled
+@merged
 def _lane_on(road, lane_id, k, x, y, net, lanes):
     """Lane of the next road to take from lane `k`, and its distance to a point [m]."""
     first = net.roads[road].first

@@ -422,4 +422,4 @@ def _specialise(*arguments) -> Callable[..., None]:
             run(0, 0, *arguments)
     finally:
         notice.cancel()
-    return run.get_overload(tuple(typeof(argument) for argument in (0, 0, *arguments)))
+    return run.overloads[tuple(typeof(argument) for argument in (0, 0, *arguments))].entry_point

@@ -117,7 +117,7 @@ def make_watch(heading_bound):
 # Of the next two one is None, and numba leaves out of the kernel what it would need.
 
 
-@compiled
+@merged
 def distances_of(e, frames, past):
     """`Distances` of environment `e` of a batch."""
     if frames is None:
@@ -125,7 +125,7 @@ def distances_of(e, frames, past):
     return Distances(frames, Past(past.memory[e], past.before[e], past.seen[e]))
 
 
-@compiled
+@merged
 def plans_of(e, ways, crossings):
     """`Plans` of environment `e` of a batch."""
     if ways is None:
@@ -171,7 +171,7 @@ def carry_over(episode, cars, crossings, ego, watch):
         crossings[i] = watch.blank_crossing[0] if was < 0 else crossings[was if was < ego else was - 1]
 
 
-@compiled
+@merged
 def start_tally(step):
     """Nothing has happened in this decision yet."""
     step.frames = step.overridden = step.limited = step.dangerous_pairs = step.broken_duties = 0
@@ -245,7 +245,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         step.partner = _car_of(report.partner, episode)
 
 
-@compiled
+@merged
 def _keep_plan(cars, episode, sight, plans, settings, step):
     """Defs. 14-18: a plan through the junction ahead."""
     car, n = cars[episode.ego], episode.cars - 1
@@ -311,7 +311,7 @@ def _refuse_lane_change(before, cars, episode, sight, plans, settings):
         episode.refused = True
 
 
-@compiled
+@merged
 def _scene(cars, episode, sight, plans, settings):
     """The ego's track and the ways that the others may take."""
     n, roads = episode.cars - 1, plans.ways.roads
@@ -337,7 +337,7 @@ def _scene(cars, episode, sight, plans, settings):
     return Scene(roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, 0.0)
 
 
-@compiled
+@merged
 def _describe(car, choice, out):
     out.x, out.y, out.heading, out.speed, out.length, out.width = (
         car.x,
@@ -353,7 +353,7 @@ def _describe(car, choice, out):
         out.lane, out.choice = car.target_lane, choice[car.route, car.target_lane]
 
 
-@compiled
+@merged
 def _car_of(user, episode):
     """Index among the cars of an index among the others."""
     return user if user < episode.ego else user + 1
@@ -397,7 +397,7 @@ def _sense(cars, episode, lanes, sight, distances, watch, settings):
     return curvature  # of the lane at the ego, the last one
 
 
-@compiled
+@merged
 def _in_own_lane(k, car, ego, lanes, sight):
     """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
     if car.cos * ego.cos + car.sin * ego.sin > 0.0:
@@ -488,7 +488,7 @@ def _nearest(cars, episode):
     return nearest
 
 
-@compiled
+@merged
 def is_at_fault(blame):
     """Does a blame code charge the ego?"""
     return blame == 1 + EGO or blame == 1 + BOTH

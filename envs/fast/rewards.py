@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled, merged
+from envs.fast.compiled import merged
 from envs.fast.config import EXIT, HIGHWAY, INTERSECTION, MERGE, TWO_WAY
 from envs.fast.floats import clip, lmap
 from envs.fast.network import is_on_lane
@@ -21,14 +21,14 @@ def is_on_road(cars, i, lanes, sight):
     return is_on_lane(lanes[k], sight.s[k, i], sight.lateral[k, i], 0.0)
 
 
-@compiled
+@merged
 def has_arrived(cars, i, lanes, sight):
     """Has a car left the intersection?"""
     k = cars[i].lane
     return lanes[k].exits and sight.s[k, i] >= _EXIT_DISTANCE
 
 
-@compiled
+@merged
 def rate(cars, episode, action, lanes, sight, config, step):
     """Reward of the last decision; its components go to `step`.
 
@@ -99,7 +99,7 @@ def _normalized(reward, config):
     return reward
 
 
-@compiled
+@merged
 def _slowness(cars, episode, lane):
     """By what share of their target speeds the cars on a lane are too slow, added up."""
     total = 0.0

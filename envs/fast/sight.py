@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.compiled import compiled, merged
+from envs.fast.compiled import merged
 from envs.fast.floats import wrap_to_pi
 from envs.fast.network import CIRCULAR, around, beside, distance, heading_at, is_far, is_on_lane, local_coordinates
 from envs.fast.state import CAR, CAR_LENGTH
@@ -142,7 +142,7 @@ def _far_from(car, i, k, lanes, sight):
     return distance(lane, s, sight.lateral[k, i]) + abs(wrap_to_pi(car.heading - heading_at(lane, s)))
 
 
-@compiled
+@merged
 def place(cars, n, lanes, sight):
     """`project` and `update_lanes` at once, for many short lanes.
 
@@ -300,7 +300,7 @@ def car_behind(k, i, n, net, lanes, sight):
     return members[behind]
 
 
-@compiled
+@merged
 def _along(k, j, net, lanes, sight):
     """Arc length of car `j` seen from lane `k` through its connected lanes, and whether it is on one."""
     for m in range(net.links.shape[1]):
@@ -312,7 +312,7 @@ def _along(k, j, net, lanes, sight):
     return 0.0, False
 
 
-@compiled
+@merged
 def _car_ahead_connected(k, i, n, net, lanes, sight):
     nearest, ahead = np.inf, -1
     bits = net.link_bits[k]
@@ -324,7 +324,7 @@ def _car_ahead_connected(k, i, n, net, lanes, sight):
     return ahead
 
 
-@compiled
+@merged
 def _car_behind_connected(k, i, n, net, lanes, sight):
     nearest, behind = -np.inf, -1
     bits = net.link_bits[k]
