@@ -7,6 +7,7 @@ from typing import Any
 
 import numba
 
+from envs.fast.blas import ROUNDING
 from shield.compiled import cached_for, fingerprint
 from shield.parts import UNWRAPPED, also_outside, only_inside
 
@@ -47,10 +48,11 @@ def merged(function):
 def kernel(function):
     """Compile an entry point that releases the interpreter lock, with a cache on disk.
 
-    As in `shield.compiled`, any change in what the kernel may be made of compiles it anew.
+    As in `shield.compiled`, any change in what the kernel may be made of compiles it anew, and so does another
+    way of numpy's to round: numba's cache knows the processor, but not what numpy makes of it.
     """
     dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **_inner, **_apart)(function)
-    return also_outside(cached_for(dispatcher, fingerprint(*sources())))
+    return also_outside(cached_for(dispatcher, f"{fingerprint(*sources())} {ROUNDING}"))
 
 
 def sources() -> list[Path]:

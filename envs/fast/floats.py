@@ -1,8 +1,4 @@
-"""The arithmetic of numpy and Python to the last bit, for compiled code.
-
-numpy computes dot products of two-vectors with a fused multiply-add; plain arithmetic would differ
-in one of four.
-"""
+"""The arithmetic of numpy and Python to the last bit, for compiled code."""
 
 from typing import Any
 
@@ -10,6 +6,7 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
+from envs.fast.blas import FUSED_FIRST, FUSED_SECOND, ROUNDING
 from envs.fast.compiled import merged
 
 _intrinsic: Any = intrinsic
@@ -28,8 +25,12 @@ def _fma(typing_context, a, b, c):
 
 @merged
 def dot(ax, ay, bx, by):
-    """`np.dot` of two plane vectors."""
-    return _fma(ay, by, ax * bx)
+    """`np.dot` of two plane vectors, rounded as it is here: another rounding would differ in one of four."""
+    if ROUNDING == FUSED_SECOND:
+        return _fma(ay, by, ax * bx)
+    if ROUNDING == FUSED_FIRST:
+        return _fma(ax, bx, ay * by)
+    return ax * bx + ay * by
 
 
 @merged

@@ -1,0 +1,47 @@
+"""Compiled code rounds as numpy does on this machine."""
+
+import os
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from envs.fast.floats import dot, norm
+
+KERNELS = ["", "Haswell", "SkylakeX"]  # of numpy's linear algebra library; one that the machine lacks is not taken
+VECTORS = np.random.default_rng(1).normal(size=(1000, 2, 2)) * 10.0
+COMPARE = """
+from test_floats import *
+assert (compiled_dots() == [np.dot(a, b) for a, b in VECTORS]).all()
+assert (compiled_norms() == [np.linalg.norm(a) for a, _ in VECTORS]).all()
+"""
+
+
+def compiled_dots():
+    call = numba.njit(lambda a, b: dot(a[0], a[1], b[0], b[1]))
+    return np.array([call(a, b) for a, b in VECTORS])
+
+
+def compiled_norms():
+    call = numba.njit(lambda a: norm(a[0], a[1]))
+    return np.array([call(a) for a, _ in VECTORS])
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_dot_products_and_norms_are_those_of_numpy(kernel):
+    here = Path(__file__).parent
+    environment = os.environ | {"PYTHONPATH": f"{here}{os.pathsep}{here.parent.parent}"}
+    if kernel:
+        environment["OPENBLAS_CORETYPE"] = kernel
+    done = subprocess.run([sys.executable, "-c", COMPARE], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_another_rounding_would_be_noticed():
+    fused = np.array([float(Fraction(a[1]) * Fraction(b[1]) + Fraction(a[0] * b[0])) for a, b in VECTORS])
+    plain = (VECTORS[:, 0] * VECTORS[:, 1]).sum(axis=1)
+    assert (fused != plain).sum() > 100
