@@ -9,10 +9,7 @@ from envs.parallel import parallel_env
 KINDS = ["intersection-multi-agent-v0", "intersection-multi-agent-v1", "intersection-multi-agent-v2"]
 SLOWER, IDLE, FASTER = range(3)
 
-pytestmark = [
-    pytest.mark.filterwarnings("ignore:.*out of date.*"),
-    pytest.mark.filterwarnings("ignore:.*creation API has been deprecated.*:DeprecationWarning"),
-]
+pytestmark = pytest.mark.filterwarnings("ignore:.*creation API has been deprecated.*:DeprecationWarning")
 
 
 def all_do(env, action):

@@ -58,6 +58,11 @@ def test_monitoring_leaves_the_trajectory_bit_identical(env_id, config):
             done = outcome[1] or outcome[2]
 
 
+@pytest.mark.filterwarnings("error")
+def test_an_earlier_version_of_an_environment_is_made_without_a_warning():
+    make("intersection-v0")
+
+
 def test_it_passes_both_environment_checkers():
     check_env(make_shielded())
     check_gymnasium_env(make_shielded(), skip_render_check=True)
