@@ -11,12 +11,9 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from shield.parts import UNWRAPPED, also_outside, only_inside
+from shield.parts import APART, MERGED, PLAIN, UNWRAPPED, also_outside, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
-_PLAIN = {"_nrt": False, "error_model": "numpy"}
-# said of every function: numba would else give it what its first compiled caller has
-_MERGED, _APART = {"forceinline": True}, {"forceinline": False}
 
 
 def fingerprint(*more: Path) -> str:
@@ -29,7 +26,7 @@ def fingerprint(*more: Path) -> str:
 
 def inner(function: Callable[..., Any]) -> Any:
     """`compiled` for what is called from compiled functions only."""
-    return only_inside(_njit(**_PLAIN, **UNWRAPPED, **_MERGED)(function))
+    return only_inside(_njit(**PLAIN, **UNWRAPPED, **MERGED)(function))
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -42,7 +39,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     elsewhere it would go on with the old code. A shield must never do that, so any change in the
     package, or in that of the function, compiles everything anew.
     """
-    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **_PLAIN, **_MERGED)(function))
+    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **PLAIN, **MERGED)(function))
 
 
 def apart(function: Callable[..., Any]) -> Any:
@@ -50,12 +47,12 @@ def apart(function: Callable[..., Any]) -> Any:
 
     For what is large and rarely called: one huge function takes far longer to translate than several.
     """
-    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **_PLAIN, **_APART)(function))
+    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **PLAIN, **APART)(function))
 
 
 def compiled_for_arrays(function: Callable[..., Any]) -> Any:
     """`compiled` for what also takes whole arrays, or makes them."""
-    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, error_model="numpy", **_MERGED)(function))
+    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, error_model="numpy", **MERGED)(function))
 
 
 def _stamped(dispatcher: Any) -> Any:

@@ -13,7 +13,12 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 
+# Options of numba. What allocates nothing needs no reference counts, which would cost more than the work itself.
+PLAIN = {"_nrt": False, "error_model": "numpy"}
 UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# said of every function: numba would else give it what its first compiled caller has
+MERGED, APART = {"forceinline": True}, {"forceinline": False}
+
 _Library: Any = JITCodeLibrary
 _Dispatcher: Any = CPUDispatcher
 

@@ -8,25 +8,19 @@ from typing import Any
 import numba
 
 from envs.fast.blas import ROUNDING
-from shield.compiled import cached_for, fingerprint
-from shield.parts import UNWRAPPED, also_outside, only_inside
+from shield.compiled import cached_for, fingerprint, inner
+from shield.parts import APART, MERGED, PLAIN, UNWRAPPED, also_outside, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
 _config: Any = numba.config
 
-# Inner functions allocate nothing, so numba need not count references to the arrays they are handed.
-# Counting would cost far more than what they compute.
-_inner = {"_nrt": False, "error_model": "numpy"}
-# said of every function: numba would else give it what its first compiled caller has
-_merged, _apart = {"forceinline": True}, {"forceinline": False}
-
 # What has one caller only becomes part of its source and is never compiled alone, which saves compile time.
-unfolded = _njit(**_inner, inline="always")
+unfolded = _njit(**PLAIN, inline="always")
 
 
 def callable_too(function):
     """What Python calls as well, outside the loops."""
-    return also_outside(_njit(**_inner, **_merged)(function))
+    return also_outside(_njit(**PLAIN, **MERGED)(function))
 
 
 def compiled(function):
@@ -34,15 +28,12 @@ def compiled(function):
 
     Where it is large or called from several places, it stays a function of its own there.
     """
-    return only_inside(_njit(**_inner, **UNWRAPPED, **_apart)(function))
+    return only_inside(_njit(**PLAIN, **UNWRAPPED, **APART)(function))
 
 
-def merged(function):
-    """An inner function merged into its callers.
-
-    Calls hand over tuples of arrays field by field, which may cost more than the work.
-    """
-    return only_inside(_njit(**_inner, **UNWRAPPED, **_merged)(function))
+# An inner function merged into its callers: calls hand over tuples of arrays field by field, which may cost more
+# than the work.
+merged = inner
 
 
 def kernel(function):
@@ -51,7 +42,7 @@ def kernel(function):
     As in `shield.compiled`, any change in what the kernel may be made of compiles it anew, and so does another
     way of numpy's to round: numba's cache knows the processor, but not what numpy makes of it.
     """
-    dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **_inner, **_apart)(function)
+    dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **PLAIN, **APART)(function)
     return also_outside(cached_for(dispatcher, f"{fingerprint(*sources())} {ROUNDING}"))
 
 
