@@ -11,9 +11,11 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
+from shield.indices import take_as_they_are
 from shield.parts import APART, MERGED, PLAIN, UNWRAPPED, also_outside, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
+take_as_they_are()
 
 
 def fingerprint(*more: Path) -> str:

@@ -42,7 +42,7 @@ class Ways(NamedTuple):
     """What it goes by where plans do. L lanes."""
 
     roads: Roads  # paths through junctions
-    choice: np.ndarray  # `[R + 1, L]` row of the paths of a driver with route R who heads for lane L; last: no route
+    choice: np.ndarray  # `[R + 1, L]` row of the paths of a driver with route R - 1 who heads for lane L; 0: no route
 
 
 class Past(NamedTuple):
@@ -92,7 +92,7 @@ def compile_ways(network, net: Network) -> Ways:
 def _choices(junction: Junction, network, net: Network) -> np.ndarray:
     ways = [(origin, end) for origin, ends in network.graph.items() for end in ends]
     routes = [[ways[road] for road in roads if road >= 0] for roads in net.route_roads]
-    return np.array([[junction.choice(index, route) for index in network.lanes_dict()] for route in [*routes, []]])
+    return np.array([[junction.choice(index, route) for index in network.lanes_dict()] for route in [[], *routes]])
 
 
 def no_lane_frames() -> LaneFrames:
@@ -350,7 +350,7 @@ def _describe(car, choice, out):
     out.wreck = car.crashed or car.kind == OBSTACLE
     out.on, out.lane, out.choice = car.lane, -1, -1
     if car.kind == TRAFFIC or car.kind == META:
-        out.lane, out.choice = car.target_lane, choice[car.route, car.target_lane]
+        out.lane, out.choice = car.target_lane, choice[car.route + 1, car.target_lane]
 
 
 @merged
