@@ -213,8 +213,10 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, watch, set
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
         changing = look_around(cars, episode, order, net, sight, flow)
-        first, last = 0, episode.ego + 1
-        for _ in range(2):  # those up to the ego, then those after it; a loop, lest the kernel contain it twice
+        # plans depend on the lanes that others head for: those up to the ego decide first, then those after it
+        in_turn = plans is not None and mode != OFF
+        first, last = 0, episode.ego + 1 if in_turn else episode.vehicles
+        while first < episode.vehicles:  # a loop, lest the kernel contain it twice
             changing = think(cars, episode, first, last, changing, net, sight, config)
             if first == 0 and mode != OFF:
                 watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step)

@@ -56,18 +56,32 @@ _FUNCTIONS = (np.tan, np.arctan, np.arcsin, np.arctan2, np.power)
 _cells = [_published(ufunc) for ufunc in _FUNCTIONS]  # referred to by the symbols
 
 
+def _room(builder, kind):
+    """Memory on the stack; that of `cgutils.alloca_once` would be cleared each time that a loop comes around to it."""
+    with builder.goto_entry_block():
+        return builder.alloca(kind)
+
+
+def _kept(builder, value):
+    """Memory on the stack with a value in it."""
+    room = _room(builder, value.type)
+    builder.store(value, room)
+    return room
+
+
 def _call(builder, ufunc, pointers, count):
     """Emit the call of a loop: its operands, each a pointer to `count` floats in a row, the result last."""
     byte, word = ir.IntType(8).as_pointer(), ir.IntType(64)
     module, name = builder.module, _PREFIX + ufunc.__name__
     cell = module.globals.get(name) or ir.GlobalVariable(module, ir.ArrayType(byte, 2), name)
     loop, data = (builder.load(cgutils.gep_inbounds(builder, cell, 0, i)) for i in range(2))
-    operands = cgutils.alloca_once(builder, ir.ArrayType(byte, len(pointers)))
-    strides = cgutils.alloca_once(builder, ir.ArrayType(word, len(pointers)))
+    operands = _room(builder, ir.ArrayType(byte, len(pointers)))
     for i, pointer in enumerate(pointers):
         builder.store(builder.bitcast(pointer, byte), cgutils.gep_inbounds(builder, operands, 0, i))
-        builder.store(word(8), cgutils.gep_inbounds(builder, strides, 0, i))
-    counts = cgutils.alloca_once_value(builder, count)
+    counts = _kept(builder, count)
+    strides = cgutils.global_constant(
+        builder, "strides", ir.Constant(ir.ArrayType(word, len(pointers)), [8] * len(pointers))
+    )
     kind = ir.FunctionType(ir.VoidType(), [byte] * 4).as_pointer()
     handed = [builder.bitcast(pointer, byte) for pointer in (operands, counts, strides)]
     builder.call(builder.bitcast(loop, kind), [*handed, data])
@@ -75,8 +89,8 @@ def _call(builder, ufunc, pointers, count):
 
 def _generate_one(ufunc):
     def generate(context, builder, signature, arguments):
-        result = cgutils.alloca_once(builder, ir.DoubleType())
-        pointers = [cgutils.alloca_once_value(builder, argument) for argument in arguments]
+        result = _room(builder, ir.DoubleType())
+        pointers = [_kept(builder, argument) for argument in arguments]
         _call(builder, ufunc, [*pointers, result], ir.IntType(64)(1))
         return builder.load(result)
 
