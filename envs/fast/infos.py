@@ -11,10 +11,16 @@ from envs.highway import AXES, Settings, response_name
 from envs.junction_ego import PLAN_NAMES
 from shield.blame import DUTIES, VERDICTS
 
-_BLAMES = np.array(["", *VERDICTS])
-_DUTIES = np.array(DUTIES)
-_RESPONSES = np.array([response_name(sum_of_bits) for sum_of_bits in range(16)])
-_AXES = np.array([*(AXES[axes] for axes in range(len(AXES))), *(PLAN_NAMES[kind] for kind in range(len(PLAN_NAMES)))])
+
+def _names(texts) -> np.ndarray:
+    """As objects: arrays of characters, each as long as the longest name, would be copied for every environment."""
+    return np.array(list(texts), object)
+
+
+_BLAMES = _names(["", *VERDICTS])
+_DUTIES = _names(DUTIES)
+_RESPONSES = _names(response_name(sum_of_bits) for sum_of_bits in range(16))
+_AXES = _names([*(AXES[axes] for axes in range(len(AXES))), *(PLAN_NAMES[kind] for kind in range(len(PLAN_NAMES)))])
 
 
 def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None) -> dict:
@@ -44,6 +50,7 @@ def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None)
 
 def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
     frames = np.maximum(steps["frames"], 1)
+    blame = _BLAMES[steps["blame"]]
     return {
         "shield": {
             "intervened": steps["overridden"] > 0,
@@ -61,9 +68,9 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
         },
         "time": steps["time"],
         "cost": steps["cost"],
-        "blame": _BLAMES[steps["blame"]],
+        "blame": blame,
         "blame_evidence": {
-            "verdict": _BLAMES[steps["blame"]],
+            "verdict": blame,
             "partner": steps["blame_partner"],
             "danger": _AXES[steps["blame_axes"]],
             "seconds_since_threshold": steps["blame_frames"] * settings.dt,
@@ -83,7 +90,7 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
 
 def info_of(infos: dict, e: int) -> dict:
     """Infos of one environment out of those of a batch, as plain Python values."""
-    info = {key: info_of(values, e) if isinstance(values, dict) else values[e].item() for key, values in infos.items()}
+    info = {key: info_of(values, e) if isinstance(values, dict) else values.item(e) for key, values in infos.items()}
     if info.get("blame") == "":
         info["blame_evidence"] = {}
     return info
