@@ -1,7 +1,7 @@
 """What each vehicle decides on a frame: speed and steering controllers, IDM, MOBIL, route following.
 
-Vehicles decide one after the other, and later ones see the target lanes of earlier ones. So does the shield, in the
-ego's turn.
+Vehicles decide one after the other, and later ones see the target lanes of earlier ones. So does a shield that goes by
+plans, in the ego's turn.
 """
 
 import numpy as np

@@ -213,7 +213,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, watch, set
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
         changing = look_around(cars, episode, order, net, sight, flow)
-        # plans depend on the lanes that others head for: those up to the ego decide first, then those after it
+        # plans depend on the lanes that others head for: the shield looks when those up to the ego have decided
         in_turn = plans is not None and mode != OFF
         first, last = 0, episode.ego + 1 if in_turn else episode.vehicles
         while first < episode.vehicles:  # a loop, lest the kernel contain it twice
