@@ -9,7 +9,16 @@ from highway_env.vehicle.objects import Landmark
 
 from shield.blame import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
 from shield.command import Command
-from shield.controller import RESPONSE_BRAKE, RESPONSE_CUT_IN, RESPONSE_GO, RESPONSE_STEER, Body, shield_frame
+from shield.controller import (
+    RESPONSE_BRAKE,
+    RESPONSE_CUT_IN,
+    RESPONSE_GO,
+    RESPONSE_STEER,
+    Body,
+    Response,
+    find_danger,
+    respond,
+)
 from shield.examined import TABLE
 from shield.geometry import ARC_START, LENGTH, PIECE_FIELDS, largest_half_extents, make_road, wrap_angle
 from shield.junction import CAUTIOUS
@@ -210,19 +219,12 @@ class ShieldedEgo:
         self._meet()
         users, ego, curvature = self._sense()
         wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
-        report = shield_frame(
-            ego,
-            users,
-            *self.last,
-            self.memory,
-            wish,
-            Body(*self.body, curvature),
-            settings.ego,
-            settings.other,
-            settings.rules,
-            settings.dt,
-        )
-        command = report.command if settings.overrides else wish
+        rules = settings.ego, settings.other, settings.rules, settings.dt
+        danger = find_danger(ego, users, *self.last, self.memory, *rules)
+        response = Response(wish, False, False)
+        if settings.overrides:
+            response = respond(wish, danger, ego, Body(*self.body, curvature), settings.rules, settings.dt)
+        command = response.command
         pairs, broken = judge_frame(
             ego, users, self.memory, command, curvature, settings.ego, settings.other, settings.dt
         )
@@ -234,29 +236,29 @@ class ShieldedEgo:
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
         self.last = (ego, users)
-        self._count(report, pairs, broken, command.acceleration - wish.acceleration, steered - steering)
+        self._count(danger, response, pairs, broken, command.acceleration - wish.acceleration, steered - steering)
         tally = self.tally
-        if max(report.margin_lon, report.margin_lat) < max(tally.margin_lon, tally.margin_lat):
-            tally.margin_lon, tally.margin_lat = report.margin_lon, report.margin_lat
-            tally.partner = self._index_on_road(report.partner)
+        if max(danger.margin_lon, danger.margin_lat) < max(tally.margin_lon, tally.margin_lat):
+            tally.margin_lon, tally.margin_lat = danger.margin_lon, danger.margin_lat
+            tally.partner = self._index_on_road(danger.partner)
         if self.record is not None:
             self.record.append(Frame(tuple(self.keys), self.poses, command, ego, users, curvature, self.jumped))
 
-    def _count(self, report, pairs: int, broken: int, acceleration_change: float, steering_change: float) -> None:
+    def _count(self, danger, response, pairs: int, broken: int, acceleration_change: float, steering_change: float):
         tally, overrides = self.tally, self.settings.overrides
         tally.frames += 1
-        tally.overridden += report.overridden and overrides
-        tally.limited += report.limited and overrides
+        tally.overridden += response.overridden and overrides
+        tally.limited += response.limited and overrides
         tally.dangerous_pairs += pairs
         tally.broken_duties += broken
         tally.acceleration_change = max(tally.acceleration_change, abs(acceleration_change))
         tally.steering_change = max(tally.steering_change, abs(float(steering_change)))
-        tally.response |= report.response
+        tally.response |= danger.response
         self.frames += 1
-        self.frames_overridden += report.overridden and overrides
+        self.frames_overridden += response.overridden and overrides
         self.dangerous_pairs += pairs
         self.broken_duties += broken
-        self.min_ttc = min(self.min_ttc, report.ttc)
+        self.min_ttc = min(self.min_ttc, danger.ttc)
 
     def _index_on_road(self, i: int) -> int:
         """Index in `road.vehicles`; static objects follow after the vehicles."""

@@ -77,7 +77,7 @@ class JunctionEgo(ShieldedEgo):
         self.frames_trapped += report.trapped
         self.pairs_examined += report.examined
         self.pairs_possible += report.possible
-        self._count(report, report.pairs, report.broken, granted - acceleration, steered - steering)
+        self._count(report, report, report.pairs, report.broken, granted - acceleration, steered - steering)
         if self.record is not None:
             command = Command(granted, float(np.arctan(0.5 * np.tan(steered))))
             self.record.append(Frame(tuple(self.keys), self.poses, command))

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shield.chosen import how_many, which
 from shield.command import Command
 from shield.compiled import apart, compiled, compiled_for_arrays, inner
 from shield.kinematics import forward_reach, speed_envelope, travel
@@ -203,21 +204,24 @@ def _audit_acceleration(role, tau, v, a, params, dt):
     return KEPT, 0.0
 
 
-@compiled
-def judge_frame(ego, users, memory, command, curvature, ego_params, other_params, dt):
-    """Judge one frame of all pairs after `shield_frame` has updated their memory.
+@apart
+def judge_frame(ego, users, memory, command, curvature, ego_params, other_params, dt, who=None):
+    """Judge one frame of all pairs after `find_danger` has updated their memory.
 
     Args:
-      ego, users, memory: as in `shield_frame`; the verdict so far is kept in `memory`.
+      ego, users, memory: as in `find_danger`; the verdict so far is kept in `memory`.
       command: `Command` that the ego executes on this frame.
       curvature: of the lane at the ego [1/m].
+      ego_params, other_params, dt: as in `find_danger`.
+      who: as in `find_danger`; nobody else may be in danger.
 
     Returns:
       (pairs, broken): dangerous pairs on this frame, and those whose duty the ego broke on it.
     """
     drift = 0.5 * curvature * ego.speed**2 * dt
     pairs = broken = 0
-    for i in range(len(users)):
+    for a in range(how_many(who, users)):
+        i = which(who, a)
         if memory[i].since > 0:
             judge_motion(memory[i], ego, users[i], ego_params, other_params, _NOW, 0.0, dt)
             duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)

@@ -1,22 +1,22 @@
-"""One frame of the shield: scene + memory + nominal command -> restricted command + report."""
+"""One frame of the shield: scene + memory -> danger; danger + nominal command -> restricted command."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from shield.chosen import how_many, which
 from shield.command import Command
 from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
-from shield.pair import assess, leading_speed, least_margin, own_share, toward
+from shield.pair import assess, leading_speed, least_cosine, least_margin, own_share, toward
 from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, remember
 
 
-class Report(NamedTuple):
-    """What the shield saw and did on one frame."""
+class Danger(NamedTuple):
+    """What the shield saw on one frame."""
 
-    command: Command  # what it lets through
-    overridden: bool  # a duty toward somebody changed the command
-    limited: bool  # only the always-on limits did
+    free: Bounds  # what the ego may do while it owes nobody anything
+    bounds: Bounds  # what it may do now
     dangerous: bool
     partner: int  # index of the road user nearest to danger, -1 if alone
     margin_lon: float  # of that pair [m]; inf if alone
@@ -25,9 +25,17 @@ class Report(NamedTuple):
     ttc: float  # time to collision with a car ahead in the way of the ego [s]; inf if none
 
 
+class Response(NamedTuple):
+    """What it makes of the ego's command."""
+
+    command: Command  # what it lets through
+    overridden: bool  # a duty toward somebody changed the command
+    limited: bool  # only the always-on limits did
+
+
 RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN, RESPONSE_GO = 1, 2, 4, 8  # GO: on through a junction
 
-_FAR = 1e-6  # a pair that is safe by more than this is far apart: more than rounding can change [m]
+SAFE_BEYOND_DOUBT = 1e-6  # margin of a pair that is far apart: more than rounding can change [m]
 _STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
 _STANDSTILL = 1e-6  # below this speed nothing moves sideways [m/s]
 
@@ -41,69 +49,106 @@ class Body(NamedTuple):
 
 
 @compiled
-def shield_frame(ego, users, ego_before, users_before, memory, nominal, body, ego_params, other_params, rules, dt):
-    """Restrict the ego's nominal command to what RSS permits on this frame.
+def find_danger(
+    ego,
+    users,
+    ego_before,
+    users_before,
+    memory,
+    ego_params,
+    other_params,
+    rules,
+    dt,
+    who=None,
+    nearest=np.inf,
+    soonest=np.inf,
+):
+    """Carry the memory of all pairs over to this frame, and find out what the ego owes to whom.
 
     Pairs that are far apart cannot bound the command and are not looked at. If one comes near later,
     the sample before is taken in first, so nothing depends on that.
-
-    Acceleration is clipped after the ego's own controller; an override brakes directly. Steering is
-    chosen so that the lateral speed of this frame, the one that the new heading commits to, course and
-    heading stay inside their bounds.
 
     Args:
       ego: `ROAD_USER` record.
       users: `[N]` `ROAD_USER` records of everybody else.
       ego_before, users_before: the same on the frame before; zeros on the first.
       memory: `[N]` `MEMORY` records, changed in place.
-      nominal: `Command` of the ego's own controller.
-      body: `Body` of the ego.
       ego_params, other_params: `RSSParams`, response times in whole frames.
       rules: `Rules` in force.
       dt: length of a frame [s].
+      who: `[K]` indices in ascending order of those to look at, if not everybody. All others are known to be far
+        apart, and marked as skipped.
+      nearest: partner and margins are of interest only if nearer to danger than this [m].
+      soonest: likewise the time to collision [s].
 
     Returns:
-      `Report`.
+      `Danger`.
     """
     free = always_on(ego, ego_params, rules, dt)
     bounds = free
-    worst, partner, margin_lon, margin_lat, ttc = np.inf, -1, np.inf, np.inf, np.inf
+    worst, partner, margin_lon, margin_lat, ttc = nearest, -1, np.inf, np.inf, soonest
     dangerous, response = False, 0
-    share_ego = own_share(ego, ego_params, dt)
-    for i in range(len(users)):
-        margin = least_margin(ego, users[i], share_ego, ego_params, other_params, rules, dt)
-        if memory[i].since == 0 and margin > max(worst, _FAR) and not _may_be_next(ego, users[i], ttc, rules):
+    share_ego = own_share(ego.speed, ego.cos, ego_params, dt)
+    lead_ego, least_cos = leading_speed(ego, rules), least_cosine(rules)
+    for a in range(how_many(who, users)):
+        i = which(who, a)
+        user = users[i]
+        margin = least_margin(
+            user.s - ego.s,
+            ego.half_length + user.half_length,
+            user.speed,
+            user.cos,
+            user.wreck,
+            share_ego,
+            lead_ego,
+            least_cos,
+            ego_params,
+            other_params,
+            dt,
+        )
+        if memory[i].since == 0 and margin > max(worst, SAFE_BEYOND_DOUBT) and not _may_be_next(ego, user, ttc, rules):
             memory[i].skipped = True
             continue
         catch_up(memory[i], ego_before, users_before[i], ego_params, other_params, rules, dt)
-        pair = assess(ego, users[i], ego_params, other_params, rules, dt)
-        remember(memory[i], pair, ego, users[i], dt)
+        pair = assess(ego, user, ego_params, other_params, rules, dt)
+        remember(memory[i], pair, ego, user, dt)
         bounds = merge(bounds, memory[i], pair, ego_params, rules, dt)
         if memory[i].since > 0:
             dangerous = True
             braking = owes_braking(memory[i], pair, rules)
             response |= RESPONSE_BRAKE if braking == 1 else (RESPONSE_CUT_IN if braking == 2 else 0)
             response |= RESPONSE_STEER if owes_lateral_stop(memory[i], rules) else 0
-        nearest = max(pair.margin_lon, pair.margin_lat)
-        if nearest < worst:
-            worst, partner, margin_lon, margin_lat = nearest, i, pair.margin_lon, pair.margin_lat
+        margin = max(pair.margin_lon, pair.margin_lat)
+        if margin < worst:
+            worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat
         if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
             ttc = min(ttc, max(pair.gap_lon, 0.0) / (pair.v_ego - pair.v_other))
+    return Danger(free, bounds, dangerous, partner, margin_lon, margin_lat, response, ttc)
 
-    limited = restrict(nominal, free, ego, body, rules, dt)
-    command = restrict(nominal, bounds, ego, body, rules, dt) if bounds != free else limited
+
+@compiled
+def respond(nominal, danger, ego, body, rules, dt):
+    """Restrict the ego's nominal command to what RSS permits on this frame.
+
+    Acceleration is clipped after the ego's own controller; an override brakes directly. Steering is
+    chosen so that the lateral speed of this frame, the one that the new heading commits to, course and
+    heading stay inside their bounds.
+
+    Args:
+      nominal: `Command` of the ego's own controller.
+      danger: `Danger` on this frame.
+      ego: `ROAD_USER` record.
+      body: `Body` of the ego.
+      rules: `Rules` in force.
+      dt: length of a frame [s].
+
+    Returns:
+      `Response`.
+    """
+    limited = restrict(nominal, danger.free, ego, body, rules, dt)
+    command = restrict(nominal, danger.bounds, ego, body, rules, dt) if danger.bounds != danger.free else limited
     overridden = command != limited
-    return Report(
-        command,
-        overridden,
-        limited != nominal and not overridden,
-        dangerous,
-        partner,
-        margin_lon,
-        margin_lat,
-        response,
-        ttc,
-    )
+    return Response(command, overridden, limited != nominal and not overridden)
 
 
 @inner

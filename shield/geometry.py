@@ -7,7 +7,7 @@ cosine and sine of the start heading. y points to the right of the driving direc
 
 import numpy as np
 
-from shield.compiled import compiled, inner
+from shield.compiled import apart, compiled, inner
 
 PIECE_FIELDS = 8
 X, Y, HEADING, CURVATURE, LENGTH, ARC_START, COS, SIN = range(PIECE_FIELDS)
@@ -61,11 +61,22 @@ def locate(road, x, y):
 
 
 @compiled
+def is_straight(road):
+    """Is a road `[K, 8]` one straight piece?"""
+    return len(road) == 1 and abs(road[0, CURVATURE]) < _STRAIGHT
+
+
+@compiled
 def nearest_piece(road, x, y):
     """As `locate`, but with the index of the piece; -1 on the tangent beyond a curved end."""
-    if len(road) == 1 and abs(road[0, CURVATURE]) < _STRAIGHT:
+    if is_straight(road):
         s, lateral, heading = _on_piece(road[0], x, y)
         return road[0, ARC_START] + s, lateral, 0, heading
+    return _search(road, x, y)
+
+
+@apart
+def _search(road, x, y):
     best = np.inf
     s_best, y_best, heading_best, k_best = 0.0, 0.0, 0.0, -1
     last = len(road) - 1

@@ -109,35 +109,46 @@ def assess(ego, user, ego_params, other_params, rules, dt):
 
 
 @compiled
-def own_share(user, params, dt):
+def own_share(v, cos, params, dt):
     """What a follower may need of the distance of Def. 1: (its way to rest, its margins) [m].
 
     The way is inf for a car that reverses or is turned round.
+
+    Args:
+      v: speed [m/s].
+      cos: of the heading relative to the lane.
+      params: `RSSParams` of the follower.
+      dt: length of a frame [s].
     """
-    if user.speed < 0.0 or user.cos <= 0.0:
+    if v < 0.0 or cos <= 0.0:
         return np.inf, 0.0
     b = params.a_min_brake
-    way = reach(user.speed, params.response_time, params.a_max_accel, b, params.v_cap)
-    return way, params.standstill_gap + euler_margin(user.speed, b, dt)
+    way = reach(v, params.response_time, params.a_max_accel, b, params.v_cap)
+    return way, params.standstill_gap + euler_margin(v, b, dt)
 
 
 @compiled
-def least_margin(ego, user, share_ego, ego_params, other_params, rules, dt):
+def least_margin(distance, half_lengths, v, cos, wreck, share_ego, lead_ego, least_cos, ego_params, other_params, dt):
     """Lower bound of `Pair.margin_lon` at a fraction of the price of `assess` [m]; -inf where none is known.
 
     Args:
-      ego, user, ego_params, other_params, rules, dt: as in `assess`.
+      distance: along the lane from the ego to the user, positive ahead [m].
+      half_lengths: of both, added up, or more [m].
+      v, cos, wreck: of the user, as in `ROAD_USER`.
       share_ego: `own_share` of the ego.
+      lead_ego: `leading_speed` of the ego.
+      least_cos: `least_cosine`.
+      ego_params, other_params, dt: as in `assess`.
     """
-    if user.speed < 0.0 or user.cos <= 0.0 or share_ego[0] == np.inf:
+    if v < 0.0 or cos <= 0.0 or share_ego[0] == np.inf:
         return -np.inf
-    if user.s >= ego.s:
+    if distance >= 0.0:
         way, margins = share_ego
-        way -= _credit(leading_speed(user, rules), ego_params, other_params)
+        way -= _credit(slowed(v, cos, wreck, least_cos), ego_params, other_params)
     else:
-        way, margins = own_share(user, other_params, dt)
-        way -= _credit(leading_speed(ego, rules), other_params, ego_params)
-    return signed_gap(user.s - ego.s, ego.half_length, user.half_length) - (max(way, 0.0) + margins)
+        way, margins = own_share(v, cos, other_params, dt)
+        way -= _credit(lead_ego, other_params, ego_params)
+    return abs(distance) - half_lengths - (max(way, 0.0) + margins)
 
 
 @inner
@@ -154,9 +165,20 @@ def leading_speed(user, rules):
 
     It may turn within the heading bound while it brakes, and a wreck may stop on the spot.
     """
-    shortest = np.sqrt(1.0 - rules.heading_bound**2) if rules.heading_bound < 1.0 else 1.0
-    v = user.speed * min(user.cos, shortest)
-    return min(v, 0.0) if user.wreck else v
+    return slowed(user.speed, user.cos, user.wreck, least_cosine(rules))
+
+
+@compiled
+def least_cosine(rules):
+    """Cosine of the largest angle to the lane within the heading bound."""
+    return np.sqrt(1.0 - rules.heading_bound**2) if rules.heading_bound < 1.0 else 1.0
+
+
+@compiled
+def slowed(v, cos, wreck, least_cos):
+    """`leading_speed` of a user that drives at `v` [m/s]; `cos`, `wreck` as in `ROAD_USER`."""
+    v = v * min(cos, least_cos)
+    return min(v, 0.0) if wreck else v
 
 
 @compiled

@@ -13,7 +13,7 @@ import numpy as np
 from shield.blame import judge_contact, judge_frame
 from shield.command import Command
 from shield.compiled import compiled_for_arrays as compiled
-from shield.controller import Body, always_on, restrict, shield_frame
+from shield.controller import Body, always_on, find_danger, respond, restrict
 from shield.geometry import half_extents, largest_half_extents
 from shield.kinematics import frames_for
 from shield.pair import ROAD_USER, assess
@@ -431,19 +431,20 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
         for i in range(w.others):
             memory[i].age = memory[i].since = memory[i].axes = 0
             memory[i].skipped = False
-    report = shield_frame(seen, users, last[w.others], last, memory, nominal, BODY, w.ego, w.other, w.rules, w.dt)
-    result.overridden += report.overridden
-    result.cut_ins += (report.response & 4) != 0
-    a, slip = report.command
+    danger = find_danger(seen, users, last[w.others], last, memory, w.ego, w.other, w.rules, w.dt)
+    response = respond(nominal, danger, seen, BODY, w.rules, w.dt)
+    result.overridden += response.overridden
+    result.cut_ins += (danger.response & 4) != 0
+    a, slip = response.command
     if w.one_axis:
         for i in range(w.others):
             if memory[i].since == 0 and memory[i].axes == LON | LAT:
                 memory[i].axes = LON
-    if w.free_throttle and report.response & 5 == 0:
+    if w.free_throttle and danger.response & 5 == 0:
         a = max(nominal.acceleration, -ego.speed / w.dt)
-    if w.soft_brake and report.response & 1 != 0:
+    if w.soft_brake and danger.response & 1 != 0:
         a = max(a, -ego.speed / 0.6)
-    if w.free_wheel and report.response & 2 == 0:
+    if w.free_wheel and danger.response & 2 == 0:
         gain = max(ego.speed * w.dt / HALF_WHEELBASE, 1e-3)
         bound = np.arcsin(w.table.heading_bound)
         low, high = _arcsin((-bound - ego.heading) / gain), _arcsin((bound - ego.heading) / gain)

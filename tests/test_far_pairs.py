@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 
 from envs import make
-from shield.command import Command
-from shield.controller import Body, shield_frame
-from shield.pair import ROAD_USER, assess, least_margin, own_share
+from shield.controller import find_danger
+from shield.pair import ROAD_USER, assess, leading_speed, least_cosine, least_margin, own_share
 from shield.params import PRESETS, Rules
 from shield.response import MEMORY, remember
 
 DT = 0.2
 SIMULATOR = PRESETS["simulator"]
-BODY = Body(2.5, 0.7, 0.0)
 REACH = 40.0  # speeds are drawn up to it [m/s]
 
 
@@ -29,6 +27,23 @@ def anybody(rng):
     return user
 
 
+def bound_on(ego, user, ego_params, other_params, rules):
+    """`least_margin` of a pair."""
+    return least_margin(
+        user["s"] - ego["s"],
+        ego["half_length"] + user["half_length"],
+        user["speed"],
+        user["cos"],
+        user["wreck"],
+        own_share(ego["speed"], ego["cos"], ego_params, DT),
+        leading_speed(ego, rules),
+        least_cosine(rules),
+        ego_params,
+        other_params,
+        DT,
+    )
+
+
 @pytest.mark.parametrize("preset", ["simulator", "slides", "rodionova-conservative"])
 def test_the_quick_bound_is_never_above_the_margin(preset):
     rng = np.random.default_rng(0)
@@ -38,7 +53,7 @@ def test_the_quick_bound_is_never_above_the_margin(preset):
         for _ in range(4000):
             ego, user = anybody(rng), anybody(rng)
             ego["wreck"] = False
-            bound = least_margin(ego, user, own_share(ego, ego_params, DT), ego_params, other_params, rules, DT)
+            bound = bound_on(ego, user, ego_params, other_params, rules)
             pair = assess(ego, user, ego_params, other_params, rules, DT)
             assert bound <= pair.margin_lon + 1e-9
             assert pair.safe_lon or not bound > 1e-6
@@ -52,7 +67,7 @@ def test_a_quick_bound_without_the_response_time_would_be_caught():
     wrong = 0
     for _ in range(2000):
         ego, user = anybody(rng), anybody(rng)
-        bound = least_margin(ego, user, own_share(ego, hasty, DT), hasty, SIMULATOR.other, Rules(), DT)
+        bound = bound_on(ego, user, hasty, SIMULATOR.other, Rules())
         wrong += bound > assess(ego, user, SIMULATOR.ego, SIMULATOR.other, Rules(), DT).margin_lon + 1e-9
     assert wrong > 10
 
@@ -82,16 +97,14 @@ def test_memory_and_report_are_those_of_a_look_at_everybody(env_id):
 
 
 def replay(frames, settings):
-    """What `shield_frame` remembers and reports over a log, and what a look at every pair gives."""
+    """What `find_danger` remembers and reports over a log, and what a look at every pair gives."""
     ego_params, other_params, rules, _, dt = settings[:5]
     count = len(frames[0].users)
     memory, thorough = np.zeros(count, MEMORY), np.zeros(count, MEMORY)
     last = np.zeros(count + 1, ROAD_USER)
     quick, full = [], []
     for frame in frames:
-        report = shield_frame(
-            frame.ego, frame.users, last[-1], last[:-1], memory, Command(0.0, 0.0), BODY, *settings[:3], dt
-        )
+        report = find_danger(frame.ego, frame.users, last[-1], last[:-1], memory, *settings[:3], dt)
         quick.append((memory.copy(), report))
         nearest, ttc = (np.inf, np.inf), np.inf
         for i, user in enumerate(frame.users):
@@ -104,3 +117,36 @@ def replay(frames, settings):
         full.append((thorough.copy(), nearest, ttc))
         last = np.append(frame.users, np.array([frame.ego], ROAD_USER))
     return quick, full
+
+
+def test_who_is_of_no_interest_changes_nothing_else():
+    """Only margins nearer, and collisions sooner, than those of before are asked for; those nearer stay the same."""
+    env = make("highway-fast-v0", shield="monitor", record=True)
+    nearer = farther = sooner = 0
+    for seed in range(6):
+        env.reset(seed=seed)
+        rng = np.random.default_rng(seed)
+        ended = False
+        while not ended:
+            *_, terminated, truncated, _ = env.step(int(rng.integers(5)))
+            ended = terminated or truncated
+        memory, bounded = (np.zeros(len(env.frames[0].users), MEMORY) for _ in range(2))
+        last = np.zeros(len(memory) + 1, ROAD_USER)
+        for frame in env.frames:
+            common = frame.ego, frame.users, last[-1], last[:-1]
+            limits = rng.uniform(-2.0, 8.0), rng.uniform(0.0, 20.0)
+            free = find_danger(*common, memory, *env.settings[:3], DT)
+            found = find_danger(*common, bounded, *env.settings[:3], DT, None, *limits)
+            margins = free.margin_lon, free.margin_lat
+            if max(margins) < limits[0]:
+                nearer += 1
+                assert (found.partner, found.margin_lon, found.margin_lat) == (free.partner, *margins)
+            else:
+                farther += 1
+                assert (found.partner, found.margin_lon, found.margin_lat) == (-1, np.inf, np.inf)
+            sooner += free.ttc < limits[1]
+            assert found.ttc == min(free.ttc, limits[1])
+            assert (found.bounds, found.dangerous, found.response) == (free.bounds, free.dangerous, free.response)
+            assert (memory["since"] == bounded["since"]).all()
+            last = np.append(frame.users, np.array([frame.ego], ROAD_USER))
+    assert min(nearer, farther, sooner) > 10

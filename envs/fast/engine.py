@@ -21,17 +21,13 @@ from envs.fast.guard import (
     MONITOR,
     OFF,
     OVERRIDE,
-    LaneFrames,
-    Past,
     Ways,
     carry_over,
     check_contact,
-    compile_lane_frames,
     compile_ways,
     distances_of,
     is_at_fault,
     make_watch,
-    no_lane_frames,
     no_ways,
     plans_of,
     refuse_lane_change,
@@ -39,6 +35,7 @@ from envs.fast.guard import (
     start_watch,
     watch_frame,
 )
+from envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past, no_lane_frames
 from envs.fast.network import Network
 from envs.fast.observations import observe
 from envs.fast.rewards import NO_ACTION, is_terminated, is_truncated, rate
@@ -50,9 +47,7 @@ from envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from envs.highway import PLANS, Settings
 from envs.wrapper import scheme_of
 from shield.junction import CROSSING
-from shield.pair import ROAD_USER
 from shield.params import PRESETS, Rules
-from shield.response import MEMORY
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
 DECIDE, RESTART, STAY = range(3)  # what an environment does on a call
@@ -310,11 +305,7 @@ class Engine:
             crossings = np.zeros((num_envs, watched), CROSSING)
         else:
             frames = compile_lane_frames(network) if settings else no_lane_frames()
-            past = Past(
-                np.zeros((num_envs, watched), MEMORY),
-                np.zeros((num_envs, watched, 2)),
-                np.zeros((num_envs, 2, watched), ROAD_USER),
-            )
+            past = make_past(num_envs, watched)
         self.world = World(
             scenario.config,
             scenario.flow,

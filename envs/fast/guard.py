@@ -11,31 +11,23 @@ import numpy as np
 from envs.fast.collisions import is_near, overlap
 from envs.fast.compiled import compiled, merged
 from envs.fast.floats import norm
-from envs.fast.network import Network, heading_at
+from envs.fast.neighbours import Distances, Past, car_of, measure, row_before, start_past
+from envs.fast.network import Network
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from envs.fast.ufuncs import arctan, tan
-from envs.highway import MAX_SLIP, road_through
+from envs.highway import MAX_SLIP
 from envs.intent import Junction, Roads, is_outside, list_threats, no_roads, track_of
 from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
 from shield.command import Command
-from shield.controller import Body, shield_frame
-from shield.geometry import PIECE_FIELDS, largest_half_extents
+from shield.controller import Body, Response, find_danger, respond
+from shield.geometry import largest_half_extents
 from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame
-from shield.lane_frame import same_frame, to_lane_frame
 from shield.plans import Scene
-from shield.response import MEMORY, catch_up, forget_safe
+from shield.response import MEMORY, catch_up
 
 OFF, MONITOR, OVERRIDE = range(3)
 _PLANS = 4  # kinds of danger from here on are plans, in `infos`
-
-
-class LaneFrames(NamedTuple):
-    """What the shield measures by where distances along lanes keep the ego safe. L lanes."""
-
-    pieces: np.ndarray  # `[P, 8]` pieces of the roads through all lanes
-    start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
-    same: np.ndarray  # `[L, L]` no gap jumps between the two frames
 
 
 class Ways(NamedTuple):
@@ -43,21 +35,6 @@ class Ways(NamedTuple):
 
     roads: Roads  # paths through junctions
     choice: np.ndarray  # `[R + 1, L]` row of the paths of a driver with route R - 1 who heads for lane L; 0: no route
-
-
-class Past(NamedTuple):
-    """What the shield remembers on lanes: N road users, the ego in the last row. A batch has one more axis in front."""
-
-    memory: np.ndarray  # `[N]` MEMORY
-    before: np.ndarray  # `[N, 2]` positions one frame ago, nan at first sight [m]
-    seen: np.ndarray  # `[2, N]` ROAD_USER of the last two frames; `episode.turn` is the row of the last one
-
-
-class Distances(NamedTuple):
-    """One ego kept safe by distances along its lane (Defs. 1-10)."""
-
-    frames: LaneFrames
-    past: Past
 
 
 class Plans(NamedTuple):
@@ -76,13 +53,6 @@ class Watch(NamedTuple):
     max_slip: float  # that the ego can steer [rad]
 
 
-def compile_lane_frames(network) -> LaneFrames:
-    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`."""
-    lanes = [road_through(network, index) for index in network.lanes_dict()]
-    same = np.array([[same_frame(a, b) for b in lanes] for a in lanes])
-    return LaneFrames(np.concatenate(lanes), np.cumsum([0, *map(len, lanes)]), same)
-
-
 def compile_ways(network, net: Network) -> Ways:
     """The paths through the junctions of a `highway_env.road.road.RoadNetwork`; `net`: the same as arrays."""
     junction = junction_of(network)
@@ -93,11 +63,6 @@ def _choices(junction: Junction, network, net: Network) -> np.ndarray:
     ways = [(origin, end) for origin, ends in network.graph.items() for end in ends]
     routes = [[ways[road] for road in roads if road >= 0] for roads in net.route_roads]
     return np.array([[junction.choice(index, route) for index in network.lanes_dict()] for route in [[], *routes]])
-
-
-def no_lane_frames() -> LaneFrames:
-    """Stands in where no shield runs."""
-    return LaneFrames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), np.zeros((0, 0), bool))
 
 
 def no_ways() -> Ways:
@@ -122,7 +87,7 @@ def distances_of(e, frames, past):
     """`Distances` of environment `e` of a batch."""
     if frames is None:
         return None
-    return Distances(frames, Past(past.memory[e], past.before[e], past.seen[e]))
+    return Distances(frames, Past(past.memory[e], past.trail[e], past.ego[e], past.near[e]))
 
 
 @merged
@@ -137,15 +102,11 @@ def plans_of(e, ways, crossings):
 def start_watch(episode, distances, plans, watch):
     """Forget everything at the start of an episode."""
     if distances is not None:
-        past = distances.past
-        for i in range(len(past.memory)):
-            past.memory[i] = watch.blank[0]
-            past.before[i, 0] = past.before[i, 1] = np.nan
+        start_past(episode, distances.past, watch.blank)
     if plans is not None:
         for i in range(len(plans.crossings)):
             plans.crossings[i] = watch.blank_crossing[0]
-    episode.frame_lane, episode.turn, episode.go, episode.frames_trapped = -1, 0, -1, 0
-    episode.path = -1
+    episode.path, episode.go, episode.frames_trapped = -1, -1, 0
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     episode.frames = episode.frames_overridden = 0
@@ -165,7 +126,7 @@ def carry_over(episode, cars, crossings, ego, watch):
       ego: index of the ego before.
     """
     for i in range(len(crossings) - 1):
-        k = _car_of(i, episode)
+        k = car_of(i, episode)
         was = cars[k].was if k < episode.cars else -1
         # those after a gap move up
         crossings[i] = watch.blank_crossing[0] if was < 0 else crossings[was if was < ego else was - 1]
@@ -210,39 +171,47 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         acceleration, steering = episode.nominal_acceleration, episode.nominal_steering
     else:
         acceleration, steering = car.acceleration, car.steering
-    curvature = _sense(cars, episode, lanes, sight, distances, watch, settings)
-    n, last = episode.cars - 1, len(past.memory) - 1
-    now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
-    ego, users, memory = now[last], now[:n], past.memory[:n]
-    wish = Command(acceleration, arctan(0.5 * tan(steering)) if steering != 0.0 else 0.0)
-    report = shield_frame(
+    # of interest is only who is nearer than anybody was on the frames before, whose tally this is
+    nearest, soonest = max(step.margin_lon, step.margin_lat), episode.min_ttc
+    curvature = measure(cars, episode, lanes, sight, distances, watch.boxes, settings, False, nearest, soonest)
+    ego, users, memory = past.ego[episode.turn], sight.users, past.memory
+    who = past.near[: episode.near]
+    danger = find_danger(
         ego,
         users,
-        then[last],
-        then[:n],
+        past.ego[row_before(episode)],
+        sight.users_before,
         memory,
-        wish,
-        Body(car.length / 2, watch.max_slip, curvature),
         settings.ego,
         settings.other,
         settings.rules,
         settings.dt,
+        who,
+        nearest,
+        soonest,
     )
-    command = report.command if settings.overrides else wish
-    pairs = broken = 0
-    if report.dangerous:
-        pairs, broken = judge_frame(ego, users, memory, command, curvature, settings.ego, settings.other, settings.dt)
-    steered = steering
-    if command.slip != wish.slip:
-        steered = arctan(2.0 * tan(command.slip))
+    wish = Command(acceleration, 0.0)
+    if settings.overrides or danger.dangerous:
+        wish = Command(acceleration, arctan(0.5 * tan(steering)) if steering != 0.0 else 0.0)
+    response = Response(wish, False, False)
     if settings.overrides:
+        body = Body(car.length / 2, watch.max_slip, curvature)
+        response = respond(wish, danger, ego, body, settings.rules, settings.dt)
+        command, steered = response.command, steering
+        if command.slip != wish.slip:
+            steered = arctan(2.0 * tan(command.slip))
         car.acceleration, car.steering = command.acceleration, steered
-    _count(episode, step, report, pairs, broken, settings.overrides)
-    step.acceleration_change = max(step.acceleration_change, abs(command.acceleration - acceleration))
-    step.steering_change = max(step.steering_change, abs(steered - steering))
-    if max(report.margin_lon, report.margin_lat) < max(step.margin_lon, step.margin_lat):
-        step.margin_lon, step.margin_lat = report.margin_lon, report.margin_lat
-        step.partner = _car_of(report.partner, episode)
+        step.acceleration_change = max(step.acceleration_change, abs(command.acceleration - acceleration))
+        step.steering_change = max(step.steering_change, abs(steered - steering))
+    pairs = broken = 0
+    if danger.dangerous:
+        pairs, broken = judge_frame(
+            ego, users, memory, response.command, curvature, settings.ego, settings.other, settings.dt, who
+        )
+    _count(episode, step, danger, response, pairs, broken, settings.overrides)
+    if danger.partner >= 0:
+        step.margin_lon, step.margin_lat = danger.margin_lon, danger.margin_lat
+        step.partner = car_of(danger.partner, episode)
 
 
 @merged
@@ -264,28 +233,28 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
     if settings.overrides:
         step.acceleration_change = max(step.acceleration_change, abs(report.acceleration - car.acceleration))
         car.acceleration = report.acceleration
-    _count(episode, step, report, report.pairs, report.broken, settings.overrides)
+    _count(episode, step, report, report, report.pairs, report.broken, settings.overrides)
     episode.frames_trapped += report.trapped
     episode.pairs_examined += report.examined
     episode.pairs_possible += report.possible
 
 
 @merged
-def _count(episode, step, report, pairs, broken, overrides):
+def _count(episode, step, danger, response, pairs, broken, overrides):
     """Take what happened on one frame into the tally."""
-    overridden = (report.overridden or episode.refused) and overrides
+    overridden = (response.overridden or episode.refused) and overrides
     episode.refused = False
     step.frames += 1
     step.overridden += overridden
-    step.limited += report.limited and not overridden and overrides
+    step.limited += response.limited and not overridden and overrides
     step.dangerous_pairs += pairs
     step.broken_duties += broken
-    step.response |= report.response
+    step.response |= danger.response
     episode.dangerous_pairs += pairs
     episode.broken_duties += broken
     episode.frames += 1
     episode.frames_overridden += overridden
-    episode.min_ttc = min(episode.min_ttc, report.ttc)
+    episode.min_ttc = min(episode.min_ttc, danger.ttc)
 
 
 @merged
@@ -316,7 +285,7 @@ def _scene(cars, episode, sight, plans, settings):
     """The ego's track and the ways that the others may take."""
     n, roads = episode.cars - 1, plans.ways.roads
     for i in range(n):
-        _describe(cars[_car_of(i, episode)], plans.ways.choice, sight.on_road[i])
+        _describe(cars[car_of(i, episode)], plans.ways.choice, sight.on_road[i])
     _describe(cars[episode.ego], plans.ways.choice, sight.on_road[n])
     track = track_of(roads, sight.on_road[n], episode.path)
     episode.path = track.path
@@ -354,60 +323,6 @@ def _describe(car, choice, out):
 
 
 @merged
-def _car_of(user, episode):
-    """Index among the cars of an index among the others."""
-    return user if user < episode.ego else user + 1
-
-
-@merged
-def _sense(cars, episode, lanes, sight, distances, watch, settings):
-    """Take in everybody in the ego's lane frame, the ego last; returns the lane's curvature."""
-    n, ego, frames, past = episode.cars, cars[episode.ego], distances.frames, distances.past
-    episode.turn = 1 - episode.turn
-    users, before = past.seen[episode.turn], past.before
-    if ego.lane != episode.frame_lane:
-        if episode.frame_lane >= 0 and not frames.same[episode.frame_lane, ego.lane]:
-            for i in range(n - 1):
-                forget_safe(past.memory[i])
-        episode.frame_lane = ego.lane
-    road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
-    curvature = 0.0
-    for row in range(n):
-        is_ego = row == n - 1
-        k, i = (episode.ego, len(users) - 1) if is_ego else (_car_of(row, episode), row)
-        car, user = cars[k], users[i]
-        box = watch.boxes[1 if car.kind == OBSTACLE else 0]
-        curvature = to_lane_frame(
-            road,
-            car.x,
-            car.y,
-            car.heading,
-            car.speed,
-            car.cos,
-            car.sin,
-            before[i, 0],
-            before[i, 1],
-            box,
-            settings.dt,
-            user,
-        )
-        user.wreck = not is_ego and (car.crashed or car.kind == OBSTACLE)
-        user.in_own_lane = _in_own_lane(k, car, ego, lanes, sight)
-        before[i, 0], before[i, 1] = car.x, car.y
-    return curvature  # of the lane at the ego, the last one
-
-
-@merged
-def _in_own_lane(k, car, ego, lanes, sight):
-    """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
-    if car.cos * ego.cos + car.sin * ego.sin > 0.0:
-        return True
-    lane, s, lateral = lanes[car.lane], sight.s[car.lane, k], sight.lateral[car.lane, k]
-    along = np.cos(car.heading - heading_at(lane, s)) > 0.0
-    return along and abs(lateral) <= (lane.width - car.width) / 2
-
-
-@merged
 def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
     """Has the ego touched somebody, or is it about to? Judged at the first such sample."""
     ego = cars[episode.ego]
@@ -419,13 +334,13 @@ def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings
 @compiled
 def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
     if distances is not None:
-        _sense(cars, episode, lanes, sight, distances, watch, settings)
+        measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf)
     n, heaviest, touched = episode.cars - 1, -1, False
     for i in range(n):
-        touched |= _touches(cars, _car_of(i, episode), episode.ego, sight, settings.dt)
+        touched |= _touches(cars, car_of(i, episode), episode.ego, sight, settings.dt)
     nearest = _nearest(cars, episode) if not touched else -1
     for i in range(n):
-        k = _car_of(i, episode)
+        k = car_of(i, episode)
         if not (_touches(cars, k, episode.ego, sight, settings.dt) if touched else k == nearest):
             continue
         verdict, axes = _verdict(i, cars, episode, sight, distances, plans, settings)
@@ -449,10 +364,9 @@ def _verdict(i, cars, episode, sight, distances, plans, settings):
         axes = verdict.axes + _PLANS
     if distances is not None:
         past = distances.past
-        memory, last = past.memory[i], len(past.memory) - 1
-        now, then = past.seen[episode.turn], past.seen[1 - episode.turn]
-        catch_up(memory, then[last], then[i], ego, other, rules, dt)
-        verdict = judge_contact(now[last], now[i], memory, ego, other, rules, dt)
+        memory, me = past.memory[i], past.ego[episode.turn]
+        catch_up(memory, past.ego[row_before(episode)], sight.users_before[i], ego, other, rules, dt)
+        verdict = judge_contact(me, sight.users[i], memory, ego, other, rules, dt)
         axes = verdict.axes
     return verdict, axes
 

@@ -18,6 +18,7 @@ from envs.fast.state import CAR, CAR_LENGTH
 from envs.fast.ufuncs import arctan2_each
 from envs.intent import CAR_ON_ROAD
 from shield.junction import SAMPLE
+from shield.pair import ROAD_USER
 from shield.plans import THREAT
 
 _WAYS = 8  # ways of one road user that there is room for
@@ -51,6 +52,8 @@ class Sight(NamedTuple):
     samples: np.ndarray  # `[N]` SAMPLE
     threats: np.ndarray  # `[M]` THREAT, ways that others may take
     box: np.ndarray  # `[6]` swept box of an obstacle
+    users: np.ndarray  # `[N]` ROAD_USER, what it measures elsewhere
+    users_before: np.ndarray  # `[N]` ROAD_USER, the same on the frame before
 
 
 def make_sight(n_lanes, n, speeds, lanes, times):
@@ -80,6 +83,8 @@ def make_sight(n_lanes, n, speeds, lanes, times):
         np.zeros(n, SAMPLE),
         np.zeros(_WAYS * n + 64, THREAT),
         np.zeros(6),
+        np.zeros(n, ROAD_USER),
+        np.zeros(n, ROAD_USER),
     )
 
 

@@ -71,7 +71,8 @@ EPISODE = np.dtype(
         ("frames_trapped", "i8"),  # on which no plan stayed clear of everybody
         ("pairs_examined", "i8"),  # pair-frames on which plans were checked against somebody
         ("pairs_possible", "i8"),  # all pair-frames
-        ("turn", "i8"),  # which of the two last frames is the last
+        ("turn", "i8"),  # row of its trail that the last frame is in
+        ("near", "i8"),  # how many others it measured then
         ("nominal_acceleration", "f8"),  # last command given from outside
         ("nominal_steering", "f8"),
         ("frames", "i8"),  # watched since reset

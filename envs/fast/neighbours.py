@@ -1,0 +1,276 @@
+"""Who is near enough to the ego, along its lane, to be measured (Defs. 1-10).
+
+On a straight road the distance along it follows from positions in the world, and so does a bound of the
+longitudinal margin. Whoever is safe beyond doubt by that, and not the nearest, is not measured at all. The
+engine keeps where everybody was on the last three frames, so that a sample that was left out can be made up for.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from envs.fast.compiled import compiled, merged
+from envs.fast.network import heading_at
+from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
+from envs.highway import road_through
+from shield.controller import SAFE_BEYOND_DOUBT
+from shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
+from shield.lane_frame import same_frame, to_lane_frame
+from shield.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
+from shield.response import MEMORY, forget_safe
+
+_HALF_DIAGONAL = np.hypot(CAR_LENGTH, CAR_WIDTH) / 2  # no road user is longer, however it is turned [m]
+_ROUNDING = 1e-6  # more than world and lane coordinates differ by [m]
+_FRAMES = 3  # that the trail goes back
+
+# Where one road user was on one frame.
+POSE = np.dtype(
+    [
+        ("x", "f8"),  # [m]; nan before the first frame
+        ("y", "f8"),
+        ("heading", "f8"),  # [rad]
+        ("speed", "f8"),  # [m/s]
+        ("cos", "f8"),  # of the heading
+        ("sin", "f8"),
+        ("wreck", "?"),
+        ("in_own_lane", "?"),
+    ],
+    align=True,
+)
+
+
+class LaneFrames(NamedTuple):
+    """What the shield measures by where distances along lanes keep the ego safe. L lanes."""
+
+    pieces: np.ndarray  # `[P, 8]` pieces of the roads through all lanes
+    start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
+    same: np.ndarray  # `[L, L]` no gap jumps between the two frames
+
+
+class Past(NamedTuple):
+    """What the shield remembers on lanes: N road users. A batch has one more axis in front."""
+
+    memory: np.ndarray  # `[N]` MEMORY of everybody but the ego
+    trail: np.ndarray  # `[3, N]` POSE; `episode.turn` is the row of the last frame
+    ego: np.ndarray  # `[3]` ROAD_USER, the ego likewise
+    near: np.ndarray  # `[N]` the first `episode.near` are those of the others who were measured on the last frame
+
+
+class Distances(NamedTuple):
+    """One ego kept safe by distances along its lane (Defs. 1-10)."""
+
+    frames: LaneFrames
+    past: Past
+
+
+def compile_lane_frames(network) -> LaneFrames:
+    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`."""
+    lanes = [road_through(network, index) for index in network.lanes_dict()]
+    same = np.array([[same_frame(a, b) for b in lanes] for a in lanes])
+    return LaneFrames(np.concatenate(lanes), np.cumsum([0, *map(len, lanes)]), same)
+
+
+def no_lane_frames() -> LaneFrames:
+    """Stands in where no shield runs."""
+    return LaneFrames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), np.zeros((0, 0), bool))
+
+
+def make_past(num_envs: int, n: int) -> Past:
+    """Room for what is remembered of `n` road users in each environment."""
+    return Past(
+        np.zeros((num_envs, n), MEMORY),
+        np.zeros((num_envs, _FRAMES, n), POSE),
+        np.zeros((num_envs, _FRAMES), ROAD_USER),
+        np.zeros((num_envs, n), np.int64),
+    )
+
+
+@merged
+def start_past(episode, past, blank):
+    """Forget everybody at the start of an episode; `blank`: `[1]` MEMORY of a first sight."""
+    for i in range(len(past.memory)):
+        past.memory[i] = blank[0]
+        past.trail[0, i].x = past.trail[0, i].y = np.nan
+    episode.frame_lane, episode.turn, episode.near = -1, 0, 0
+    if len(past.memory) > 0:  # there is a shield
+        _mark_all(episode, past)
+
+
+@merged
+def _mark_all(episode, past):
+    """Count everybody among the near ones."""
+    episode.near = episode.cars - 1
+    for i in range(episode.near):
+        past.near[i] = i
+
+
+@merged
+def car_of(user, episode):
+    """Index among the cars of an index among the others."""
+    return user if user < episode.ego else user + 1
+
+
+@merged
+def measure(cars, episode, lanes, sight, distances, boxes, settings, everybody, nearest, soonest):
+    """Take this frame in, and measure the ego and whoever matters on it in the ego's lane frame.
+
+    Who that is stands in `past.near`. The ego's record is in `past.ego`, theirs are in `sight.users`, and those of
+    the frame before, where they were left out on it, in `sight.users_before`.
+
+    Args:
+      cars, episode, lanes, sight: of the environment.
+      distances: `Distances`.
+      boxes: as in `Watch`.
+      settings: `envs.highway.Settings`.
+      everybody: matters.
+      nearest, soonest: as in `shield.controller.find_danger`.
+
+    Returns:
+      Curvature of the lane at the ego [1/m].
+    """
+    frames, past, ego, dt = distances.frames, distances.past, cars[episode.ego], settings.dt
+    episode.turn = _row(episode, 1)
+    lane_before = _choose_frame(episode, distances, ego.lane)
+    now, before, earlier = past.trail[episode.turn], past.trail[row_before(episode)], past.trail[_row(episode, 1)]
+    road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
+    road_before = frames.pieces[frames.start[lane_before] : frames.start[lane_before + 1]]
+    me = past.ego[episode.turn]
+    _note(ego, now[episode.ego])
+    curvature = _to_record(road, now[episode.ego], before[episode.ego], boxes[0], dt, me)
+    me.wreck, me.in_own_lane = False, True
+    threshold = _look_over(cars, episode, ego, me, road, now, sight.x, settings, soonest)
+    threshold = max(min(threshold, nearest), SAFE_BEYOND_DOUBT) + _ROUNDING
+    _choose_near(episode, past, sight.x, np.inf if everybody else threshold)
+    for a in range(episode.near):
+        i = past.near[a]
+        k = car_of(i, episode)
+        car, pose, user = cars[k], now[k], sight.users[i]
+        box = boxes[1 if car.kind == OBSTACLE else 0]
+        _to_record(road, pose, before[k], box, dt, user)
+        pose.in_own_lane = _in_own_lane(k, car, ego, lanes, sight)
+        user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
+        if past.memory[i].skipped:
+            _make_up(road_before, before[k], earlier[k], box, dt, sight.users_before[i])
+    return curvature
+
+
+@compiled
+def _make_up(road, pose, earlier, box, dt, user):
+    _to_record(road, pose, earlier, box, dt, user)
+    user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
+
+
+@merged
+def _row(episode, frames):
+    """Row of the trail so many frames on."""
+    row = episode.turn + frames
+    return row if row < _FRAMES else row - _FRAMES
+
+
+@merged
+def row_before(episode):
+    """Row of the trail of the frame before the last."""
+    return _row(episode, _FRAMES - 1)
+
+
+@merged
+def _choose_frame(episode, distances, lane):
+    """Measure along the lane the ego is on; returns the one before. Gaps that jump with it are nobody's doing."""
+    before = episode.frame_lane
+    episode.frame_lane = lane
+    if before < 0:
+        return lane
+    if lane != before and not distances.frames.same[before, lane]:
+        for i in range(episode.cars - 1):
+            forget_safe(distances.past.memory[i])
+        _mark_all(episode, distances.past)
+    return before
+
+
+@merged
+def _note(car, pose):
+    """Keep where a car is."""
+    pose.x, pose.y, pose.heading, pose.speed = car.x, car.y, car.heading, car.speed
+    pose.cos, pose.sin = car.cos, car.sin
+    pose.wreck = car.crashed or car.kind == OBSTACLE
+    pose.in_own_lane = True
+
+
+@merged
+def _to_record(road, pose, before, box, dt, user):
+    return to_lane_frame(
+        road, pose.x, pose.y, pose.heading, pose.speed, pose.cos, pose.sin, before.x, before.y, box, dt, user
+    )
+
+
+@merged
+def _look_over(cars, episode, ego, me, road, now, bounds, settings, soonest):
+    """Note where everybody is, and bound the longitudinal margin of each from below [m].
+
+    Where the bound is -inf nothing is known, or the time to collision may be the shortest.
+
+    Returns:
+      A margin [m] that the nearest of all has at most: no required distance is negative.
+    """
+    straight = is_straight(road)
+    cos, sin = road[0, COS], road[0, SIN]
+    share = own_share(me.speed, me.cos, settings.ego, settings.dt)
+    lead, least_cos = leading_speed(me, settings.rules), least_cosine(settings.rules)
+    half_lengths, half_widths = me.half_length + _HALF_DIAGONAL, me.half_width + _HALF_DIAGONAL
+    nearest = np.inf
+    for i in range(episode.cars - 1):
+        k = car_of(i, episode)
+        car, pose = cars[k], now[k]
+        _note(car, pose)
+        if not straight:
+            bounds[i] = -np.inf
+            continue
+        dx, dy = car.x - ego.x, car.y - ego.y
+        along, across = dx * cos + dy * sin, dy * cos - dx * sin
+        slant = car.cos * cos + car.sin * sin
+        bound = least_margin(
+            along,
+            half_lengths,
+            car.speed,
+            slant,
+            pose.wreck,
+            share,
+            lead,
+            least_cos,
+            settings.ego,
+            settings.other,
+            settings.dt,
+        )
+        in_the_way = (along >= 0.0) & (abs(across) < half_widths)
+        closing = ego.speed - slowed(car.speed, slant, pose.wreck, least_cos)
+        is_next = in_the_way & (along - half_lengths < soonest * closing + _ROUNDING)
+        oncoming = car.cos * ego.cos + car.sin * ego.sin <= 0.0
+        bounds[i] = -np.inf if is_next | oncoming else bound
+        nearest = min(nearest, max(abs(along), abs(across)))
+    return nearest
+
+
+@merged
+def _choose_near(episode, past, bounds, threshold):
+    """Drop those of the near ones who are far by now, and list whoever is near."""
+    for a in range(episode.near):
+        i = past.near[a]
+        if past.memory[i].since > 0:
+            bounds[i] = -np.inf
+        elif bounds[i] > threshold:
+            past.memory[i].skipped = True
+    count = 0
+    for i in range(episode.cars - 1):
+        past.near[count] = i
+        count += not bounds[i] > threshold
+    episode.near = count
+
+
+@merged
+def _in_own_lane(k, car, ego, lanes, sight):
+    """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
+    if car.cos * ego.cos + car.sin * ego.sin > 0.0:
+        return True
+    lane, s, lateral = lanes[car.lane], sight.s[car.lane, k], sight.lateral[car.lane, k]
+    along = np.cos(car.heading - heading_at(lane, s)) > 0.0
+    return along and abs(lateral) <= (lane.width - car.width) / 2
