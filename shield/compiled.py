@@ -52,6 +52,16 @@ def apart(function: Callable[..., Any]) -> Any:
     return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **PLAIN, **APART)(function))
 
 
+def rare(function: Callable[..., Any]) -> Any:
+    """`inner`, but a function of its own in its callers: for what is seldom called.
+
+    It does not even lie between what is often executed, so that more of that fits into the processor's cache.
+    """
+    dispatcher = only_inside(_njit(**PLAIN, **UNWRAPPED, **APART)(function))
+    dispatcher.rare = True
+    return dispatcher
+
+
 def compiled_for_arrays(function: Callable[..., Any]) -> Any:
     """`compiled` for what also takes whole arrays, or makes them."""
     return _stamped(_njit(cache=True, no_cfunc_wrapper=True, error_model="numpy", **MERGED)(function))

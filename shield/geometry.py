@@ -7,7 +7,7 @@ cosine and sine of the start heading. y points to the right of the driving direc
 
 import numpy as np
 
-from shield.compiled import apart, compiled, inner
+from shield.compiled import compiled, inner, rare
 
 PIECE_FIELDS = 8
 X, Y, HEADING, CURVATURE, LENGTH, ARC_START, COS, SIN = range(PIECE_FIELDS)
@@ -75,7 +75,7 @@ def nearest_piece(road, x, y):
     return _search(road, x, y)
 
 
-@apart
+@rare
 def _search(road, x, y):
     best = np.inf
     s_best, y_best, heading_best, k_best = 0.0, 0.0, 0.0, -1

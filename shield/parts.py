@@ -67,10 +67,16 @@ class Inner(_Dispatcher):
     """
 
     _library: type = _Part
+    rare = False  # LLVM keeps what leads to a call of it out of the way of what runs all the time
 
     def compile(self, sig: Any) -> Any:
         with _making(self._library):
-            return super().compile(sig)
+            machine_code = super().compile(sig)
+        if self.rare:
+            for compiled in self.overloads.values():
+                module = compiled.library._final_module
+                module.get_function(compiled.fndesc.llvm_func_name).add_function_attribute("cold")
+        return machine_code
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         raise TypeError(f"{self.py_func.__name__} can only be called from compiled code")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import apart, compiled
+from shield.compiled import compiled, rare
 from shield.kinematics import speed_envelope
 from shield.pair import assess
 
@@ -105,7 +105,7 @@ def catch_up(memory, ego_before, user_before, ego_params, other_params, rules, d
         _take_in(memory, ego_before, user_before, ego_params, other_params, rules, dt)
 
 
-@apart
+@rare
 def _take_in(memory, ego, user, ego_params, other_params, rules, dt):
     remember(memory, assess(ego, user, ego_params, other_params, rules, dt), ego, user, dt)
 

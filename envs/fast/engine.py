@@ -46,6 +46,7 @@ from envs.fast.threads import Crew
 from envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from envs.highway import PLANS, Settings
 from envs.wrapper import scheme_of
+from shield.compiled import rare
 from shield.junction import CROSSING
 from shield.params import PRESETS, Rules
 
@@ -111,7 +112,7 @@ class Film(NamedTuple):
     cars: np.ndarray  # `[slots, frames, N]` CAR after each frame
 
 
-@compiled
+@rare
 def _populate(cars, episode, order, world, sight, flow):
     config, net = world.config[0], world.network
     if flow is None:
@@ -130,7 +131,7 @@ def _go_on(cars, episode, order, world, plans, watch, mode, flow):
             carry_over(episode, cars, plans.crossings, was_ego, watch)
 
 
-@compiled
+@rare
 def _restart(cars, episode, order, world, sight, distances, plans, watch, mode, step, out):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
@@ -162,7 +163,7 @@ def _see(cars, episode, world, sight, out):
     )
 
 
-@compiled
+@rare
 def _see_apart(cars, episode, world, sight, out):
     """`_see` where it is rare; the kernel would else contain it thrice."""
     _see(cars, episode, world, sight, out)

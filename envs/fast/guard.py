@@ -20,6 +20,7 @@ from envs.intent import Junction, Roads, is_outside, list_threats, no_roads, tra
 from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
 from shield.command import Command
+from shield.compiled import rare
 from shield.controller import Body, Response, find_danger, respond
 from shield.geometry import largest_half_extents
 from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame
@@ -98,7 +99,7 @@ def plans_of(e, ways, crossings):
     return Plans(ways, crossings[e])
 
 
-@compiled
+@rare
 def start_watch(episode, distances, plans, watch):
     """Forget everything at the start of an episode."""
     if distances is not None:
@@ -331,7 +332,7 @@ def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings
     return episode.blame != 0
 
 
-@compiled
+@rare
 def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
     if distances is not None:
         measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf)
@@ -353,7 +354,7 @@ def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
             episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
 
 
-@compiled
+@rare
 def _verdict(i, cars, episode, sight, distances, plans, settings):
     """Who is to blame for the contact with road user `i`, and where the danger came from, as in `infos`."""
     ego, other, rules, dt = settings.ego, settings.other, settings.rules, settings.dt

@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.compiled import compiled, merged
+from envs.fast.compiled import merged
 from envs.fast.network import heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
 from envs.highway import road_through
+from shield.compiled import rare
 from shield.controller import SAFE_BEYOND_DOUBT
 from shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
 from shield.lane_frame import same_frame, to_lane_frame
@@ -154,7 +155,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, everybody, 
     return curvature
 
 
-@compiled
+@rare
 def _make_up(road, pose, earlier, box, dt, user):
     _to_record(road, pose, earlier, box, dt, user)
     user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
