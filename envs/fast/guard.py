@@ -334,24 +334,40 @@ def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings
 
 @rare
 def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
+    count, heaviest = _list_partners(cars, episode, sight, settings.dt), -1
     if distances is not None:
+        episode.near, past = count, distances.past
+        for a in range(count):
+            past.near[a] = sight.some[a]
         measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf)
-    n, heaviest, touched = episode.cars - 1, -1, False
-    for i in range(n):
-        touched |= _touches(cars, car_of(i, episode), episode.ego, sight, settings.dt)
-    nearest = _nearest(cars, episode) if not touched else -1
-    for i in range(n):
-        k = car_of(i, episode)
-        if not (_touches(cars, k, episode.ego, sight, settings.dt) if touched else k == nearest):
-            continue
+    for a in range(count):
+        i = sight.some[a]
         verdict, axes = _verdict(i, cars, episode, sight, distances, plans, settings)
         weight = _weight(verdict.verdict)
         if weight > heaviest:
             heaviest = weight
-            episode.blame, episode.blame_partner = 1 + verdict.verdict, k
+            episode.blame, episode.blame_partner = 1 + verdict.verdict, car_of(i, episode)
             episode.blame_axes, episode.blame_frames = axes, verdict.frames
             episode.ego_duty, episode.ego_excess = verdict.ego_duty, verdict.ego_excess
             episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
+
+
+@compiled
+def _list_partners(cars, episode, sight, dt):
+    """Put those in touch with the ego, or else the nearest, into `sight.some`; returns how many."""
+    count, nearest, best = 0, -1, np.inf
+    ego = cars[episode.ego]
+    for i in range(episode.cars - 1):
+        k = car_of(i, episode)
+        if _touches(cars, k, episode.ego, sight, dt):
+            sight.some[count] = i
+            count += 1
+        far = norm(cars[k].x - ego.x, cars[k].y - ego.y)
+        if far < best:
+            nearest, best = i, far
+    if count == 0 and nearest >= 0:
+        sight.some[0], count = nearest, 1
+    return count
 
 
 @rare
@@ -391,16 +407,6 @@ def _touches(cars, k, ego, sight, dt):
         return False
     touches, will_touch, _, _ = overlap(first, second, sight.corners, dt)
     return touches or will_touch
-
-
-@compiled
-def _nearest(cars, episode):
-    ego, nearest, best = cars[episode.ego], -1, np.inf
-    for k in range(episode.cars):
-        far = norm(cars[k].x - ego.x, cars[k].y - ego.y)
-        if k != episode.ego and far < best:
-            nearest, best = k, far
-    return nearest
 
 
 @merged

@@ -112,7 +112,7 @@ def car_of(user, episode):
 
 
 @merged
-def measure(cars, episode, lanes, sight, distances, boxes, settings, everybody, nearest, soonest):
+def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nearest, soonest):
     """Take this frame in, and measure the ego and whoever matters on it in the ego's lane frame.
 
     Who that is stands in `past.near`. The ego's record is in `past.ego`, theirs are in `sight.users`, and those of
@@ -123,7 +123,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, everybody, 
       distances: `Distances`.
       boxes: as in `Watch`.
       settings: `envs.highway.Settings`.
-      everybody: matters.
+      chosen: those who matter are in `past.near` already, the first `episode.near`.
       nearest, soonest: as in `shield.controller.find_danger`.
 
     Returns:
@@ -140,8 +140,8 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, everybody, 
     curvature = _to_record(road, now[episode.ego], before[episode.ego], boxes[0], dt, me)
     me.wreck, me.in_own_lane = False, True
     threshold = _look_over(cars, episode, ego, me, road, now, sight.x, settings, soonest)
-    threshold = max(min(threshold, nearest), SAFE_BEYOND_DOUBT) + _ROUNDING
-    _choose_near(episode, past, sight.x, np.inf if everybody else threshold)
+    if not chosen:
+        _choose_near(episode, past, sight.x, max(min(threshold, nearest), SAFE_BEYOND_DOUBT) + _ROUNDING)
     for a in range(episode.near):
         i = past.near[a]
         k = car_of(i, episode)

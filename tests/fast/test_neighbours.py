@@ -24,11 +24,11 @@ def _start(episode, past, blank):
 
 
 @numba.njit
-def _look(cars, episode, net, sight, frames, past, boxes, settings, everybody, limit, nearest, soonest):
+def _look(cars, episode, net, sight, frames, past, boxes, settings, chosen, limit, nearest, soonest):
     """One frame, in which `limit` decides who is measured; returns what is found and how many were measured."""
     survey(cars, episode, net, sight, None)
     distances = Distances(frames, past)
-    measure(cars, episode, net.lanes, sight, distances, boxes, settings, everybody, limit, soonest)
+    measure(cars, episode, net.lanes, sight, distances, boxes, settings, chosen, limit, soonest)
     danger = find_danger(
         past.ego[episode.turn],
         sight.users,
@@ -59,6 +59,8 @@ class Shield:
     def look(self, everybody, limit, nearest, soonest):
         engine = self.engine
         world, sight, boxes = engine.world, engine._sights[0], self.watch.boxes
+        if everybody:
+            self.past.near[:], self.episode["near"] = np.arange(len(self.past.near)), self.episode["cars"] - 1
         limits = everybody, limit, nearest, soonest
         cars = engine.batch.cars[0]
         return _look(cars, self.episode, world.network, sight, world.frames, self.past, boxes, self.settings, *limits)
