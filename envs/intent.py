@@ -27,6 +27,7 @@ _BETWEEN = 1.0  # further from the middle of the lane it heads for, a car is on 
 # by a factor of e in `_DECAY` [s] when they are fast; to turn the wheels and to straighten up takes them `_TURN_TIME`
 # [s] and `_TURN_LENGTH` [m].
 _CLEAR, _DECAY, _TURN_TIME, _SLANT, _TURN_LENGTH = 1.5, 0.6, 0.4, 2.0, 3.0
+_ANY_LANE = -1  # all bits
 _ROLL = 1.05  # a wreck rolls to rest in this time at its speed [s]
 
 # One road user in the world, as a simulator says.
@@ -282,9 +283,7 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
                     count = _add(roads, track, left, roads.through[left], i, car, v_cap, threats, count)
                     samples[i].lanes |= 1 << left
             else:
-                lanes = _fitting(roads, car)
-                if memory[i].age > 0 and lanes & memory[i].reachable != 0:
-                    lanes &= memory[i].reachable
+                lanes = _fitting(roads, car, memory[i].reachable if memory[i].age > 0 else 0)
                 samples[i].lanes = lanes
                 for lane in range(len(roads.lanes)):
                     if lanes >> lane & 1:
@@ -301,12 +300,16 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
 
 
 @compiled
-def _fitting(roads, car):
-    """Lanes that a car may be driving on by its pose, as a set of bits."""
-    lanes = 0
-    for lane in range(len(roads.lanes)):
-        if _fits(roads.lanes[lane], car, max(_BEYOND, roads.lead[lane]), _OFF, _TURNED):
-            lanes |= 1 << lane
+def _fitting(roads, car, expected):
+    """Lanes that a car may be driving on by its pose, of those expected if there are any; sets of bits."""
+    lanes, among = 0, expected
+    while lanes == 0:
+        for lane in range(len(roads.lanes)):
+            if among >> lane & 1 and _fits(roads.lanes[lane], car, max(_BEYOND, roads.lead[lane]), _OFF, _TURNED):
+                lanes |= 1 << lane
+        if among == _ANY_LANE:
+            break
+        among = _ANY_LANE
     return lanes
 
 
@@ -315,8 +318,7 @@ def _joined(lanes, sets):
     """Union of the sets `[L]` of some lanes, all as bits."""
     union = 0
     for lane in range(len(sets)):
-        if lanes >> lane & 1:
-            union |= sets[lane]
+        union |= sets[lane] & -(lanes >> lane & 1)  # without a branch: several lanes at once
     return union
 
 

@@ -147,13 +147,14 @@ def is_left_out(scene, i):
 
 
 @compiled
-def count_examined(scene, n):
-    """Road users, of n, with a way that plans are checked against."""
-    count = 0
-    for i in range(n):
-        for k in range(len(scene.threats)):
-            threat = scene.threats[k]
-            if threat.user == i and not (threat.ignored or threat.left_out):
-                count += 1
-                break
+def count_examined(scene):
+    """Road users with a way that plans are checked against; the ways of each stand together.
+
+    A light is none (`user` = -1).
+    """
+    count, last = 0, -1
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        if threat.user >= 0 and threat.user != last and not (threat.ignored or threat.left_out):
+            count, last = count + 1, threat.user
     return count

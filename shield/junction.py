@@ -164,7 +164,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         broken,
         trapped,
         _ttc(scene),
-        count_examined(scene, len(samples)),
+        count_examined(scene),
         len(samples),
     )
 
@@ -175,8 +175,9 @@ def has_plan(scene, memory, entry, at_line):
 
     Nobody may find the ego closer ahead than a follower's safe distance who did not follow it before.
     """
+    _find_followers(scene, memory)
     for i in range(len(memory)):
-        follows, gap_is_safe = _is_behind(scene, i, memory[i].behind)
+        follows, gap_is_safe = _is_behind(scene, i)
         if follows and not (gap_is_safe or memory[i].behind):
             return False
     sort_out(scene, memory, entry)
@@ -198,19 +199,24 @@ def limit(a, v, ego, dt):
 @compiled
 def sort_out(scene, memory, entry):
     """Mark the ways of others that the ego need not stay clear of: followers, and who must give way."""
+    _find_followers(scene, memory)
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
-        threat.ignored = threat.left_out = False
+        threat.ignored, threat.left_out = threat.follows, False
         look_ahead(scene, threat)
-        if threat.path < 0:
-            continue
-        if is_follower(scene, threat, memory[threat.user].behind):
-            threat.ignored = True
-        elif entry != CAUTIOUS and not threat.wreck and threat.red_for == 0.0:
+        if threat.path >= 0 and not threat.follows and entry != CAUTIOUS and not threat.wreck and threat.red_for == 0.0:
             obliged = entry == ASSERTIVE or threat.priority > 0
             if obliged and can_give_way(scene, threat):
                 threat.ignored = True
                 memory[threat.user].relied = True
+
+
+@inner
+def _find_followers(scene, memory):
+    """Note who drives behind the ego."""
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        threat.follows = threat.path >= 0 and is_follower(scene, threat, memory[threat.user].behind)
 
 
 @compiled
@@ -300,8 +306,8 @@ def _duties_broken(scene, a, users):
     broken = 0
     for i in range(users):
         alone = _alone_with(scene, i)
-        items = _plans_now(alone, i)
-        if items != 0 and not _is_kept(alone, i, a, items):
+        items, kept = _plans_and_duty(alone, i, a)
+        if items != 0 and not kept:
             broken += 1 if alone.threats[0].path >= 0 else users
     return broken
 
@@ -327,7 +333,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     """
     _judge_motion(sample, memory, scene.other, scene.dt)
     scene = _alone_with(scene, i)
-    follows, gap_is_safe = _is_behind(scene, i, memory.behind)
+    follows, gap_is_safe = _is_behind(scene, i)
     dangerous, kept, items, cut_in, followed = False, True, STOP, False, False
     if follows:
         memory.behind |= gap_is_safe
@@ -339,8 +345,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
         if stop_conflict(scene, strongest, i, ANYWHERE, 0.0) != NEVER:
             dangerous = True
             if not clear:
-                items = _plans_now(scene, i)
-                kept = _is_kept(scene, i, a, items)
+                items, kept = _plans_and_duty(scene, i, a)
     if items != 0:
         memory.items, memory.since = items, 0
         memory.ego_broke = memory.other_broke = KEPT
@@ -357,7 +362,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
         memory.ego_broke = LEFT_NO_PLAN if items != 0 else WAVERED
         memory.ego_excess = abs(a)
     if trapped and not kept and not cut_in:
-        kept = _is_kept(scene, i, a, 0)
+        kept = _is_resolute(scene, a)
     memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
     memory.reachable = sample.reachable
     memory.wreck, memory.astray = sample.wreck, sample.astray
@@ -402,14 +407,14 @@ def _judge_motion(sample, memory, other, dt):
 
 
 @inner
-def _is_behind(scene, i, established):
+def _is_behind(scene, i):
     """Does a road user follow the ego, whatever way it takes, and at a safe distance (Lemma 2)?"""
     behind, safe, other = False, True, scene.other
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if threat.user != i:
             continue
-        if threat.path < 0 or not is_follower(scene, threat, established):
+        if not threat.follows:
             return False, False
         behind = True
         distance = behind_by(scene.paths, scene.track, threat)
@@ -420,6 +425,13 @@ def _is_behind(scene, i, established):
 
 
 @apart
+def _plans_and_duty(scene, i, a):
+    """Kinds of plans that stay clear of one road user from this sample on, and does the ego do its duty toward it?"""
+    items = _plans_now(scene, i)
+    return items, (_leaves_plan(scene, i, a) if items != 0 else _is_resolute(scene, a))
+
+
+@inner
 def _plans_now(scene, i):
     """Kinds of plans that stay clear of one road user from this sample on."""
     brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
@@ -428,13 +440,17 @@ def _plans_now(scene, i):
     return GO if go_plan(scene, throttle(scene, scene.track.s, scene.track.v), i, ANYWHERE, 0.0)[0] >= 0 else 0
 
 
-@apart
-def _is_kept(scene, i, a, items):
-    """Does the ego's acceleration leave it a plan? Where there is none, does it brake or go on with all it has?"""
-    if items == 0:
-        stops = scene.track.v + a * scene.dt <= _TOLERANCE
-        goes = a >= throttle(scene, scene.track.s, scene.track.v) - _TOLERANCE
-        return stops or goes or a <= -scene.ego.a_min_brake + _TOLERANCE
+@inner
+def _is_resolute(scene, a):
+    """Where there is no plan, does the ego brake or go on with all it has?"""
+    stops = scene.track.v + a * scene.dt <= _TOLERANCE
+    goes = a >= throttle(scene, scene.track.s, scene.track.v) - _TOLERANCE
+    return stops or goes or a <= -scene.ego.a_min_brake + _TOLERANCE
+
+
+@inner
+def _leaves_plan(scene, i, a):
+    """Does the ego's acceleration leave it a plan toward a road user?"""
     return stop_conflict(scene, a, i, ANYWHERE, 0.0) == NEVER or go_plan(scene, a, i, ANYWHERE, 0.0)[0] >= 0
 
 

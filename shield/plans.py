@@ -19,7 +19,7 @@ import numpy as np
 
 from shield.compiled import compiled, inner
 from shield.conflict_areas import CELL, Paths, cell_of, in_conflict
-from shield.kinematics import response_distance, stopping_distance, travel
+from shield.kinematics import response_distance, stopping_distance, time_to_cover_accelerating, travel
 from shield.longitudinal import d_min_following
 from shield.params import RSSParams
 from shield.right_of_way import can_stop_before
@@ -42,6 +42,10 @@ _TAIL = 3  # frames between two moments at which a go plan may begin to brake
 _LONGEST = 10.0  # throttle phase of a plan, at most [s]
 _BODIES = 8.0  # cars that follow each other are in each other's way that far apart, margins included [m]
 _REST = 1e-9  # below this speed a plan has come to rest [m/s]
+_STRIDE = 8  # frames of a plan that are looked at together
+_FEW = 250.0  # frames, in which rounding ...
+_ROUNDING = 1e-9  # ... moves a place by less than this [m] ...
+_UNSURE = 1e-10  # ... and a moment by less than this many frames
 
 # One way that a road user may take. SI units.
 THREAT = np.dtype(
@@ -56,6 +60,7 @@ THREAT = np.dtype(
         ("priority", "i8"),  # +1: the ego has the right of way over it, -1: the other way round
         ("red_for", "f8"),  # it is counted on to wait at a light for this long [s]; 0 = it is not
         ("line", "f8"),  # and until then its centre stays behind this arc length [m]
+        ("follows", "?"),  # drives behind the ego on its way
         ("ignored", "?"),  # behind the ego on its lane, or obliged and able to give way
         ("left_out", "?"),  # the ego's plans are not checked against it: see `shield.examined`
         ("stops_here", "?"),  # who is behind it on its approach is not looked at
@@ -225,9 +230,10 @@ def meets(scene, s, slack, threat, t, resting):
             )
         )
     low, high = nearest(threat, t, other), np.inf if resting else farthest(threat, t, other)
-    return _conflicts(scene.paths, track.path, s, slack, threat.path, low, high) or (
-        leaves and _conflicts(scene.paths, track.beside, s + track.shift, slack, threat.path, low, high)
-    )
+    if _conflicts(scene.paths, track.path, s - slack, s + slack, threat.path, low, high):
+        return True
+    s += track.shift
+    return leaves and _conflicts(scene.paths, track.beside, s - slack, s + slack, threat.path, low, high)
 
 
 @inner
@@ -237,9 +243,9 @@ def _overlaps(paths, path, s, slack, from_cell, to_cell):
 
 
 @inner
-def _conflicts(paths, path, s, slack, other_path, low, high):
-    """Is the ego, on a path, in the way of somebody between `low` and `high` on another [m]?"""
-    for i in range(cell_of(s - slack, paths.cells[path]), cell_of(s + slack, paths.cells[path]) + 1):
+def _conflicts(paths, path, start, end, other_path, low, high):
+    """Is the ego, between two places on a path, in the way of somebody between `low` and `high` on another [m]?"""
+    for i in range(cell_of(start, paths.cells[path]), cell_of(end, paths.cells[path]) + 1):
         if in_conflict(paths, path, i, other_path, low, high):
             return True
     return False
@@ -267,17 +273,25 @@ def look_ahead(scene, threat):
         return
     here = cell_of(track.s - SLACK - scene.drift, paths.cells[track.path])
     entry = paths.first[track.path, threat.path, here]
-    low, high = 0, int(_LONGEST / scene.dt)  # the frame sought is among them, or later
     if entry == np.inf:
-        low = high
-    while low < high:
-        middle = (low + high) // 2
-        if farthest(threat, middle * scene.dt, scene.other) < entry:
-            low = middle + 1
-        else:
-            high = middle
-    threat.free_until = low
+        threat.free_until = NEVER
+        return
+    threat.free_until = _frames_before(threat, entry, scene.other, scene.dt)
     threat.joins = paths.joins[track.path, threat.path, cell_of(track.s, paths.cells[track.path])]
+
+
+@inner
+def _frames_before(threat, s, other, dt):
+    """First frame on which a road user may have come to an arc length, or one before it.
+
+    By the inverse of `farthest`; a light would only make it later.
+    """
+    if threat.wreck:
+        return NOW if farthest(threat, 0.0, other) >= s else NEVER - 1
+    distance = s - threat.s - _ROUNDING
+    driven = max(distance - _SHORT_CUT, distance / (1.0 + _SHORT_CUT_SHARE))
+    t = time_to_cover_accelerating(driven, max(threat.v, 0.0), other.a_max_accel, threat.cap)
+    return int(min(np.ceil(t / dt - _UNSURE), NEVER - 1))
 
 
 # ---------------------------------------------------------------- plans
@@ -306,9 +320,9 @@ def _counts(threat, n, only):
 
 
 @inner
-def _is_away(scene, s, n, threat):
-    """Is a road user too far away on frame n to be in the way of the ego at `s` or behind it (see `look_ahead`)?"""
-    return n < threat.free_until and cell_of(s, scene.paths.cells[scene.track.path]) < threat.joins
+def _may_follow(scene, s, threat):
+    """May a road user be behind the ego at `s`, for all that `look_ahead` noted?"""
+    return cell_of(s, scene.paths.cells[scene.track.path]) >= threat.joins
 
 
 @inner
@@ -320,25 +334,28 @@ def _meets_anyone(scene, s, v, n, only, slack):
     t = n * scene.dt
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
-        if not _counts(threat, n, only) or _is_away(scene, s, n, threat):
+        if not _counts(threat, n, only):
             continue
-        if follows(scene, s, v, threat, t):
+        if _may_follow(scene, s, threat) and follows(scene, s, v, threat, t):
             threat.left = n
-        elif meets(scene, s, slack, threat, t, False):
+        elif n >= threat.free_until and meets(scene, s, slack, threat, t, False):
             return True
     return False
 
 
 @inner
 def begin(scene):
-    """Nobody has become a follower yet."""
+    """Nobody has become a follower yet; who never meets the ego need not be looked at, as if it were one."""
     for k in range(len(scene.threats)):
-        scene.threats[k].left = NEVER
+        threat = scene.threats[k]
+        threat.left = NOW if threat.free_until == NEVER else NEVER
 
 
 @compiled
 def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
     """First frame on which braking to rest from frame `n` meets somebody, `NEVER` if none.
+
+    Where only one road user counts, any such frame: then nobody asks how long the plan would last.
 
     Args:
       scene: `Scene`.
@@ -352,36 +369,118 @@ def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
     rest = s + v * dt + stopping_distance(v, brake) + scene.drift
     if at_line and paths.crossed[path, cell_of(rest, paths.cells[path])]:
         return n
-    s_rest, v_rest, n_rest = s, v, n
-    while v_rest > _REST:
-        s_rest, v_rest = step(s_rest, v_rest, -brake, dt)
-        n_rest += 1
+    s_rest, n_rest = _rest(scene, s, v, n, brake, slack)
     conflict = NEVER
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if not _counts(threat, n, only):
             continue
-        if n_rest > 0 and _is_away(scene, s_rest, n_rest - 1, threat):
-            if n_rest < conflict and meets(scene, s_rest, slack, threat, n_rest * dt, True):
-                conflict = n_rest
+        met_at_rest = meets(scene, s_rest, slack, threat, n_rest * dt, True)
+        if not met_at_rest and _is_clear(scene, s, n, s_rest, n_rest, slack, threat):
+            continue
+        falls_behind = _may_fall_behind(scene, s, v, n, s_rest, brake, threat)
+        if met_at_rest and not falls_behind and (only >= 0 or n_rest <= threat.free_until):
+            conflict = min(conflict, n_rest)
         else:
-            conflict = min(conflict, _meets_braking(scene, s, v, n, brake, conflict, slack, threat))
+            at = _meets_braking(scene, s, v, n, n_rest, brake, conflict, slack, threat, falls_behind)
+            conflict = min(conflict, at)
+        if only >= 0 and conflict < NEVER:
+            return conflict
     return conflict
 
 
 @inner
-def _meets_braking(scene, s, v, n, brake, until, slack, threat):
+def _rest(scene, s, v, n, brake, slack):
+    """Where and on which frame the ego comes to rest if it brakes from frame n on; `meets` cannot tell from exactly."""
+    dt = scene.dt
+    frames = (v - _REST) / (brake * dt)
+    whole = max(np.ceil(frames), 0.0)
+    s_rest = s + dt * whole * (v - 0.5 * brake * dt * (whole - 1.0))
+    doubtful = whole > _FEW or abs(frames - np.rint(frames)) < _UNSURE or scene.track.beside >= 0
+    if doubtful or _is_at_edge(s_rest - slack) or _is_at_edge(s_rest + slack):
+        s_rest = s
+        while v > _REST:
+            s_rest, v = step(s_rest, v, -brake, dt)
+            n += 1
+        return s_rest, n
+    return s_rest, n + int(whole)
+
+
+@inner
+def _is_at_edge(s):
+    """Would rounding matter to the cell at arc length `s`?"""
+    return np.floor((s - _ROUNDING) / CELL) != np.floor((s + _ROUNDING) / CELL)
+
+
+@inner
+def _is_clear(scene, s, n, s_rest, n_rest, slack, threat):
+    """Is a road user beyond doubt not met while the ego is between `s` on frame n and `s_rest` on frame `n_rest`?
+
+    Neither of them drives back, so both are where they may be on the first frame, on the last one or in between.
+    """
+    if n_rest <= threat.free_until:
+        return True
+    if threat.path < 0 or threat.v < 0.0 or scene.track.beside >= 0:
+        return False
+    low = nearest(threat, n * scene.dt, scene.other) - _ROUNDING
+    high = farthest(threat, n_rest * scene.dt, scene.other) + _ROUNDING
+    end = s_rest + slack + _ROUNDING
+    return not _conflicts(scene.paths, scene.track.path, s - slack, end, threat.path, low, high)
+
+
+@inner
+def _may_fall_behind(scene, s, v, n, s_rest, brake, threat):
+    """May a road user become a follower while the ego brakes from `s` and `v` on frame n to `s_rest`?
+
+    The gap grows only while the ego is faster than the other may be, and the distance that a follower needs only grows.
+    """
+    paths, track, other, t = scene.paths, scene.track, scene.other, n * scene.dt
+    s_rest += _ROUNDING
+    if threat.path < 0 or threat.wreck or not _may_follow(scene, s_rest, threat):
+        return False
+    if threat.red_for > 0.0:
+        return True
+    v_other = fastest(threat, t, other)
+    faster = max(v - v_other, 0.0)
+    s_other = farthest(threat, t, other) - _furthest_ahead(paths, track.path, s, s_rest, threat.path)
+    gap = s - track.half_length - threat.half_length - s_other
+    widest = gap + faster * scene.dt + stopping_distance(faster, brake) + _ROUNDING
+    return widest > 0.0 and widest >= distance_behind(threat, v_other, v, other)
+
+
+@inner
+def _furthest_ahead(paths, path, s, s_end, other_path):
+    """How much larger arc lengths are on another path at most, on lanes of both that the ego follows up to `s_end`."""
+    most, i, last = -np.inf, cell_of(s, paths.cells[path]), cell_of(s_end, paths.cells[path])
+    while i <= last:
+        lane = paths.lane[path, last]
+        offset = paths.offset[other_path, lane]
+        if not np.isnan(offset):
+            most = max(most, offset - paths.offset[path, lane])
+        last = paths.reached[path, last] - 1
+    return most
+
+
+@inner
+def _meets_braking(scene, s, v, n, n_rest, brake, until, slack, threat, falls_behind):
     """First frame from n on, before `until`, on which the braking ego meets a road user; `NEVER` if none.
 
     Once it is a follower, it is none that the ego meets.
     """
+    single_until = n_rest if falls_behind else n  # frame up to which single frames are looked at
     while n < until:
+        if single_until <= n < n_rest - _STRIDE:
+            if _is_clear(scene, s, n, s + _STRIDE * v * scene.dt, n + _STRIDE, slack, threat):
+                for _ in range(_STRIDE):
+                    s, v = step(s, v, -brake, scene.dt)
+                n += _STRIDE
+                continue
+            single_until = n + _STRIDE
         t, resting = n * scene.dt, v <= _REST
-        if resting or not _is_away(scene, s, n, threat):
-            if follows(scene, s, v, threat, t):
-                return NEVER
-            if meets(scene, s, slack, threat, t, resting):
-                return n
+        if falls_behind and _may_follow(scene, s, threat) and follows(scene, s, v, threat, t):
+            return NEVER
+        if (resting or n >= threat.free_until) and meets(scene, s, slack, threat, t, resting):
+            return n
         if resting:
             return NEVER
         s, v = step(s, v, -brake, scene.dt)
@@ -403,7 +502,7 @@ def go_plan(scene, a, only, at_line, slack):
 
     Returns:
       (frames of throttle, frame of the first conflict): frames = -1 if there is no such plan; then the
-      latest first conflict of all.
+      latest first conflict of all, as `tail_conflict` says it.
     """
     begin(scene)
     s, v = step(scene.track.s, scene.track.v, a, scene.dt)

@@ -31,8 +31,17 @@ def examined(scene, which, samples=None):
     samples = np.zeros(len(scene.threats), SAMPLE) if samples is None else samples
     examine(scene, samples, which, SLACK)
     users = [int(i) for i in scene.threats["user"][~scene.threats["left_out"]]]
-    assert count_examined(scene, len(samples)) == len(users)
+    assert count_examined(scene) == len(users)
     return users
+
+
+def test_a_road_user_counts_once_and_a_light_not_at_all():
+    a, b = crossing_pairs()[0]
+    scene = scene_of(a, 80.0, 9.0, [(b, 80.0, 9.0), (b, 70.0, 9.0), (-1, 0.0, 0.0)])
+    scene.threats["user"] = [3, 3, -1]
+    assert count_examined(scene) == 1
+    scene.threats["ignored"][:2] = True
+    assert count_examined(scene) == 0
 
 
 def past_the_junction(path):

@@ -4,10 +4,29 @@ import numpy as np
 import pytest
 from junction_world import DT, EGO, TABLE, Duel, arms, crossing_pairs, junction
 
+from envs.intent import CAR_ON_ROAD, _fitting
 from shield.blame import VERDICTS
-from shield.conflict_areas import CELL, FAR
+from shield.compiled import compiled
+from shield.conflict_areas import CELL, FAR, cell_of
 from shield.junction import ASSERTIVE, CAUTIOUS, CROSSING, PRIORITY, SAMPLE, judge_crossing, sort_out
-from shield.plans import NEVER, SLACK, THREAT, Scene, Track, go_plan, plan_conflict, stop_conflict
+from shield.plans import (
+    NEVER,
+    SLACK,
+    THREAT,
+    Scene,
+    Track,
+    _rest,
+    begin,
+    farthest,
+    follows,
+    go_plan,
+    meets,
+    plan_conflict,
+    step,
+    stop_conflict,
+    tail_conflict,
+    throttle,
+)
 
 STARTS = [(s, v) for s in (70.0, 88.0, 97.0) for v in (0.0, 9.0)]
 OTHERS = [(s, v) for s in (55.0, 80.0, 95.0) for v in (3.0, 9.0)]
@@ -253,6 +272,137 @@ def test_looking_ahead_saves_work_and_changes_nothing(env_id):
         changed_by_haste += conflicts(scene, a, only, slack) != foreseen
     assert far > 200
     assert changed_by_haste > 0
+
+
+@compiled
+def looks(scene, s, v, n, only, slack, resting):
+    """Is anybody met on a frame? Looked at one by one."""
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        if threat.ignored or threat.left <= n or 0 <= only != threat.user:
+            continue
+        if follows(scene, s, v, threat, n * scene.dt):
+            threat.left = n
+        elif meets(scene, s, slack, threat, n * scene.dt, resting):
+            return True
+    return False
+
+
+@compiled
+def stop_frame_by_frame(scene, s, v, n, brake, only, slack):
+    """`tail_conflict` without bounds."""
+    while v > 1e-9:
+        if looks(scene, s, v, n, only, slack, False):
+            return n
+        s, v = step(s, v, -brake, scene.dt)
+        n += 1
+    return n if looks(scene, s, v, n, only, slack, True) else NEVER
+
+
+def go_frame_by_frame(scene, a, only, slack):
+    """Frames of throttle of a `go_plan`, without bounds."""
+    s, v = max(scene.track.s + scene.track.v * DT, 0.0), max(scene.track.v + a * DT, 0.0)
+    threats = scene.threats
+    threats["left"] = NEVER
+    for n in range(1, 150):
+        if looks(scene, s, v, n, only, slack, False):
+            return -1
+        if n % 3 == 2:
+            left = threats["left"].copy()
+            if stop_frame_by_frame(scene, s, v, n, scene.ego.a_min_brake, only, slack) == NEVER:
+                return n - 1
+            threats["left"] = left
+        s, v = s + v * DT, max(v + throttle(scene, s, v) * DT, 0.0)
+    return -1
+
+
+@pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0"])
+def test_whole_plans_are_judged_as_frame_by_frame(env_id):
+    rng = np.random.default_rng(2)
+    met = clear = gone = 0
+    for _ in range(1500):
+        scene = crowd(env_id, rng)
+        only, slack = int(rng.choice([-1, 3])), rng.choice([0.0, SLACK])
+        brake, n = rng.choice([EGO.a_min_brake, EGO.a_max_brake]), int(rng.choice([0, 1, 20]))
+        v = rng.choice([0.0, 10 * brake * DT, rng.uniform(0.0, 12.0)])
+        begin_of(scene)
+        found = tail_conflict(scene, scene.track.s, v, n, brake, only, False, slack)
+        scene.threats["left"] = NEVER
+        expected = stop_frame_by_frame(scene, scene.track.s, v, n, brake, only, slack)
+        assert (found == expected) if only < 0 else ((found == NEVER) == (expected == NEVER))
+        met, clear = met + (expected < NEVER), clear + (expected == NEVER)
+        a = rng.choice([-6.0, 0.0, 3.0])
+        go = go_plan(scene, a, only, False, slack)[0]
+        assert go == go_frame_by_frame(scene, a, only, slack)
+        gone += go >= 0
+    assert min(met, clear, gone) > 100
+
+
+@compiled
+def begin_of(scene):
+    begin(scene)
+
+
+@compiled
+def rest_of(scene, s, v, n, brake, slack):
+    return _rest(scene, s, v, n, brake, slack)
+
+
+def test_where_a_plan_comes_to_rest_is_as_frame_by_frame():
+    rng = np.random.default_rng(3)
+    scene = crowd("intersection-v0", rng)
+    cells = scene.paths.cells[scene.track.path]
+    for _ in range(5000):
+        brake, slack = rng.uniform(1.0, 9.0), rng.choice([0.0, SLACK])
+        frames = rng.integers(60)
+        v = rng.choice([frames * brake * DT, frames * brake * DT + 1e-9, rng.uniform(0.0, 20.0)])
+        edge = CELL * rng.integers(200) + slack - 0.5 * v**2 / brake - 0.5 * v * DT  # it may come to rest at one
+        place = rng.choice([edge, rng.uniform(0.0, 150.0)])
+        found, n = rest_of(scene, place, v, 1, brake, slack)
+        s, m = place, 1
+        while v > 1e-9:
+            s, v, m = s + v * DT, max(v - brake * DT, 0.0), m + 1
+        assert n == m and abs(found - s) < 1e-9
+        for side in (-slack, slack):
+            assert cell_of(found + side, cells) == cell_of(s + side, cells)
+
+
+@pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0"])
+def test_nobody_comes_sooner_than_foreseen_nor_much_later(env_id):
+    rng = np.random.default_rng(4)
+    counted = 0
+    for _ in range(300):
+        scene = crowd(env_id, rng)
+        paths, track = scene.paths, scene.track
+        for threat in scene.threats:
+            entry = paths.first[track.path, threat["path"], cell_of(track.s - SLACK, paths.cells[track.path])]
+            until = int(threat["free_until"])
+            if until < 1000:
+                assert until == 0 or farthest(threat, (until - 1) * DT, scene.other) < entry
+                assert farthest(threat, until * DT, scene.other) > entry - 1e-6
+                counted += until > 10
+            else:
+                assert farthest(threat, 100.0, scene.other) < entry
+    assert counted > 100
+
+
+@pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0"])
+def test_lanes_that_are_expected_are_asked_first_and_the_others_where_none_fits(env_id):
+    rng = np.random.default_rng(5)
+    roads = junction(env_id).roads
+    left_out = surprised = 0
+    for _ in range(300):
+        path = int(rng.integers(len(roads.paths.cells)))
+        box = roads.paths.boxes[path, int(rng.integers(roads.paths.cells[path]))]
+        car = np.zeros(1, CAR_ON_ROAD)[0]
+        car["x"], car["y"] = box[:2] + rng.uniform(-1.0, 1.0, 2)
+        car["heading"] = np.arctan2(box[3], box[2]) + rng.uniform(-0.3, 0.3)
+        everywhere = _fitting(roads, car, -1)
+        expected = int(rng.integers(1 << len(roads.lanes)))
+        left_out += everywhere & ~expected != 0
+        surprised += everywhere & expected == 0
+        assert _fitting(roads, car, expected) == (everywhere & expected or everywhere)
+    assert min(left_out, surprised) > 20
 
 
 @pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0"])
