@@ -172,7 +172,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         acceleration, steering = episode.nominal_acceleration, episode.nominal_steering
     else:
         acceleration, steering = car.acceleration, car.steering
-    # of interest is only who is nearer than anybody was on the frames before, whose tally this is
+    # only who is nearer than anybody was before, in this decision or this episode, changes the tally
     nearest, soonest = max(step.margin_lon, step.margin_lat), episode.min_ttc
     curvature = measure(cars, episode, lanes, sight, distances, watch.boxes, settings, False, nearest, soonest)
     ego, users, memory = past.ego[episode.turn], sight.users, past.memory
@@ -191,9 +191,10 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         nearest,
         soonest,
     )
-    wish = Command(acceleration, 0.0)
-    if settings.overrides or danger.dangerous:
-        wish = Command(acceleration, arctan(0.5 * tan(steering)) if steering != 0.0 else 0.0)
+    slip = 0.0  # which nobody asks about where nothing is to be changed or judged
+    if steering != 0.0 and (settings.overrides or danger.dangerous):
+        slip = arctan(0.5 * tan(steering))
+    wish = Command(acceleration, slip)
     response = Response(wish, False, False)
     if settings.overrides:
         body = Body(car.length / 2, watch.max_slip, curvature)
