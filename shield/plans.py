@@ -391,7 +391,10 @@ def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
 
 @inner
 def _rest(scene, s, v, n, brake, slack):
-    """Where and on which frame the ego comes to rest if it brakes from frame n on; `meets` cannot tell from exactly."""
+    """Where and on which frame the ego comes to rest if it brakes from frame n on.
+
+    In closed form, and frame by frame where the difference by rounding might matter to `meets`.
+    """
     dt = scene.dt
     frames = (v - _REST) / (brake * dt)
     whole = max(np.ceil(frames), 0.0)

@@ -72,17 +72,23 @@ def test_a_quick_bound_without_the_response_time_would_be_caught():
     assert wrong > 10
 
 
-@pytest.mark.parametrize("env_id", ["highway-fast-v0", "two-way-v0", "merge-v1"])
-def test_memory_and_report_are_those_of_a_look_at_everybody(env_id):
+def episodes(env_id, count):
+    """An environment after each of so many random episodes under a watching shield, and a generator."""
     env = make(env_id, shield="monitor", record=True)
-    skipped = dangerous = 0
-    for seed in range(4):
+    for seed in range(count):
         env.reset(seed=seed)
         rng = np.random.default_rng(seed)
         ended = False
         while not ended:
             *_, terminated, truncated, _ = env.step(int(rng.integers(5)))
             ended = terminated or truncated
+        yield env, rng
+
+
+@pytest.mark.parametrize("env_id", ["highway-fast-v0", "two-way-v0", "merge-v1"])
+def test_memory_and_report_are_those_of_a_look_at_everybody(env_id):
+    skipped = dangerous = 0
+    for env, _ in episodes(env_id, 4):
         quick, full = replay(env.frames, env.settings)
         for (memory, report), (thorough, nearest, ttc) in zip(quick, full, strict=True):
             skipped += memory["skipped"].sum()
@@ -121,15 +127,8 @@ def replay(frames, settings):
 
 def test_who_is_of_no_interest_changes_nothing_else():
     """Only margins nearer, and collisions sooner, than those of before are asked for; those nearer stay the same."""
-    env = make("highway-fast-v0", shield="monitor", record=True)
     nearer = farther = sooner = 0
-    for seed in range(6):
-        env.reset(seed=seed)
-        rng = np.random.default_rng(seed)
-        ended = False
-        while not ended:
-            *_, terminated, truncated, _ = env.step(int(rng.integers(5)))
-            ended = terminated or truncated
+    for env, rng in episodes("highway-fast-v0", 6):
         memory, bounded = (np.zeros(len(env.frames[0].users), MEMORY) for _ in range(2))
         last = np.zeros(len(memory) + 1, ROAD_USER)
         for frame in env.frames:
