@@ -244,7 +244,9 @@ class ShieldedEgo:
         if self.record is not None:
             self.record.append(Frame(tuple(self.keys), self.poses, command, ego, users, curvature, self.jumped))
 
-    def _count(self, danger, response, pairs: int, broken: int, acceleration_change: float, steering_change: float):
+    def _count(
+        self, danger, response, pairs: int, broken: int, acceleration_change: float, steering_change: float
+    ) -> None:
         tally, overrides = self.tally, self.settings.overrides
         tally.frames += 1
         tally.overridden += response.overridden and overrides

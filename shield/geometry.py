@@ -77,6 +77,7 @@ def nearest_piece(road, x, y):
 
 @rare
 def _search(road, x, y):
+    """`nearest_piece` on any road. Motorways are straight; where roads wind, a call costs little beside the rest."""
     best = np.inf
     s_best, y_best, heading_best, k_best = 0.0, 0.0, 0.0, -1
     last = len(road) - 1
