@@ -302,14 +302,13 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
 @compiled
 def _fitting(roads, car, expected):
     """Lanes that a car may be driving on by its pose, of those expected if there are any; sets of bits."""
-    lanes, among = 0, expected
-    while lanes == 0:
+    lanes = 0
+    for among in (expected, _ANY_LANE):
+        if lanes != 0:
+            break
         for lane in range(len(roads.lanes)):
             if among >> lane & 1 and _fits(roads.lanes[lane], car, max(_BEYOND, roads.lead[lane]), _OFF, _TURNED):
                 lanes |= 1 << lane
-        if among == _ANY_LANE:
-            break
-        among = _ANY_LANE
     return lanes
 
 

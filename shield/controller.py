@@ -153,11 +153,16 @@ def respond(nominal, danger, ego, body, rules, dt):
 
 @inner
 def _may_be_next(ego, user, ttc, rules):
-    """May this user, driving the same way, be ahead in the way of the ego and nearer in time than `ttc` [s]?"""
-    if user.s < ego.s or signed_gap(user.y - ego.y, ego.half_width, user.half_width) >= 0.0:
-        return False
-    closing = ego.speed - leading_speed(user, rules)
-    return closing > 0.0 and not signed_gap(user.s - ego.s, ego.half_length, user.half_length) >= ttc * closing
+    """`may_be_next` of a measured pair, driving the same way."""
+    gap_lon = signed_gap(user.s - ego.s, ego.half_length, user.half_length)
+    gap_lat = signed_gap(user.y - ego.y, ego.half_width, user.half_width)
+    return may_be_next(user.s >= ego.s, gap_lon, gap_lat, ego.speed - leading_speed(user, rules), ttc)
+
+
+@compiled
+def may_be_next(ahead, gap_lon, gap_lat, closing, ttc):
+    """May a user be ahead in the way of the ego, and nearer in time than `ttc` [s]? Gaps [m], closing speed [m/s]."""
+    return ahead and gap_lat < 0.0 and closing > 0.0 and gap_lon < ttc * closing
 
 
 @compiled

@@ -14,7 +14,7 @@ from envs.fast.network import heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
 from envs.highway import road_through
 from shield.compiled import rare
-from shield.controller import SAFE_BEYOND_DOUBT
+from shield.controller import SAFE_BEYOND_DOUBT, may_be_next
 from shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
 from shield.lane_frame import same_frame, to_lane_frame
 from shield.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
@@ -242,11 +242,11 @@ def _look_over(cars, episode, ego, me, road, now, bounds, settings, soonest):
             settings.other,
             settings.dt,
         )
-        in_the_way = (along >= 0.0) & (abs(across) < half_widths)
         closing = ego.speed - slowed(car.speed, slant, pose.wreck, least_cos)
-        is_next = in_the_way & (along - half_lengths < soonest * closing + _ROUNDING)
+        gap_lon, gap_lat = along - half_lengths - _ROUNDING, abs(across) - half_widths
+        is_next = may_be_next(along >= 0.0, gap_lon, gap_lat, closing, soonest)
         oncoming = car.cos * ego.cos + car.sin * ego.sin <= 0.0
-        bounds[i] = -np.inf if is_next | oncoming else bound
+        bounds[i] = -np.inf if is_next or oncoming else bound
         nearest = min(nearest, max(abs(along), abs(across)))
     return nearest
 
