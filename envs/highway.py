@@ -11,8 +11,8 @@ from shield.blame import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_fr
 from shield.command import Command
 from shield.controller import (
     RESPONSE_BRAKE,
-    RESPONSE_CUT_IN,
     RESPONSE_GO,
+    RESPONSE_PRESENT,
     RESPONSE_STEER,
     Body,
     Response,
@@ -401,7 +401,7 @@ def response_name(response: int) -> str:
     """Name of a sum of RESPONSE_* bits."""
     if response & RESPONSE_GO:
         return "go"
-    brakes = response & (RESPONSE_BRAKE | RESPONSE_CUT_IN)
+    brakes = response & (RESPONSE_BRAKE | RESPONSE_PRESENT)
     if response & RESPONSE_STEER:
         return "both" if brakes else "lateral"
     return "longitudinal" if brakes else "none"

@@ -165,7 +165,10 @@ def _share_toward(v, params, b, dt):
 
 @compiled
 def audit_command(memory, ego, command, drift, params, dt):
-    """Did the ego's command keep its duty toward one road user on one dangerous frame?
+    """Did the ego's command keep its duties toward one road user on one dangerous frame?
+
+    These are the duties of the threshold (Def. 10) and those of the situation as it is now (hole H23), each with
+    the response time counted from when it came about.
 
     Args:
       memory: `MEMORY` record after this sample, since > 0.
@@ -184,9 +187,19 @@ def audit_command(memory, ego, command, drift, params, dt):
         )
         if duty != KEPT:
             return duty, excess
+    if memory.role_now != FRONT:
+        duty, excess = _audit_acceleration(
+            memory.role_now, memory.role_for * dt, ego.speed, command.acceleration, params, dt
+        )
+        if duty != KEPT:
+            return duty, excess
+    u = ego.speed * np.sin(ego.heading + command.slip) - drift
     if owes(memory, LAT):
-        u = ego.speed * np.sin(ego.heading + command.slip) - drift
         excess = memory.side * u - lateral_speed_limit(memory.since, memory.w_ego, params, dt)
+        if excess > _TOLERANCE:
+            return TOWARD, excess
+    if memory.side_now != 0.0:
+        excess = memory.side_now * u - lateral_speed_limit(memory.side_for, memory.w_side, params, dt)
         if excess > _TOLERANCE:
             return TOWARD, excess
     return KEPT, 0.0

@@ -9,7 +9,7 @@ from shield.command import Command
 from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
 from shield.pair import assess, leading_speed, least_cosine, least_margin, own_share, toward
-from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, remember
+from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, owes_no_approach, remember
 
 
 class Danger(NamedTuple):
@@ -21,7 +21,7 @@ class Danger(NamedTuple):
     partner: int  # index of the road user nearest to danger, -1 if alone
     margin_lon: float  # of that pair [m]; inf if alone
     margin_lat: float
-    response: int  # sum of RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN, RESPONSE_GO
+    response: int  # sum of RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_PRESENT, RESPONSE_GO
     ttc: float  # time to collision with a car ahead in the way of the ego [s]; inf if none
 
 
@@ -33,7 +33,8 @@ class Response(NamedTuple):
     limited: bool  # only the always-on limits did
 
 
-RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN, RESPONSE_GO = 1, 2, 4, 8  # GO: on through a junction
+# PRESENT: brake for who is ahead by now; GO: on through a junction
+RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_PRESENT, RESPONSE_GO = 1, 2, 4, 8
 
 SAFE_BEYOND_DOUBT = 1e-6  # margin of a pair that is far apart: more than rounding can change [m]
 _STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
@@ -112,12 +113,13 @@ def find_danger(
         catch_up(memory[i], ego_before, users_before[i], ego_params, other_params, rules, dt)
         pair = assess(ego, user, ego_params, other_params, rules, dt)
         remember(memory[i], pair, ego, user, dt)
-        bounds = merge(bounds, memory[i], pair, ego_params, rules, dt)
+        bounds = merge(bounds, memory[i], ego_params, rules, dt)
         if memory[i].since > 0:
             dangerous = True
-            braking = owes_braking(memory[i], pair, rules)
-            response |= RESPONSE_BRAKE if braking == 1 else (RESPONSE_CUT_IN if braking == 2 else 0)
-            response |= RESPONSE_STEER if owes_lateral_stop(memory[i], rules) else 0
+            braking = owes_braking(memory[i], rules)
+            response |= RESPONSE_BRAKE if braking == 1 else (RESPONSE_PRESENT if braking == 2 else 0)
+            if owes_lateral_stop(memory[i], rules) or owes_no_approach(memory[i], rules):
+                response |= RESPONSE_STEER
         margin = max(pair.margin_lon, pair.margin_lat)
         if margin < worst:
             worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat

@@ -196,7 +196,7 @@ class Rules(NamedTuple):
     limits: bool = True  # always-on limits of acceleration and lateral speed (C1, C1y)
     memory: bool = True  # respond on the axis that was safe last (C7); off: on the longitudinal one
     no_credit: bool = True  # lateral distance without credit for receding (hole H22)
-    brake_behind_cut_in: bool = True  # also brake behind a car that cuts in (hole H6)
+    present_duties: bool = True  # in danger, also answer the situation as it is now (holes H6, H23)
     brake_if_inherited: bool = True  # brake at a_max_brake where danger was never anybody's doing
     heading_bound: float = 0.1  # largest sine of the angle between car and lane [1]; 1 = no bound
     discretisation_margin: bool = True  # C5: explicit Euler, the last partial braking step

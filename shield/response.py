@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, rare
+from shield.compiled import compiled, inner, rare
 from shield.kinematics import speed_envelope
 from shield.pair import assess
 
 NEVER, LON, LAT = 0, 1, 2  # axes that were safe at the last safe sample; LON | LAT is both
+REAR, FRONT, CORRECT, WRONG = 0, 1, 2, 3  # longitudinal roles of the ego; the last two where cars drive at each other
 
 MEMORY = np.dtype(
     [
@@ -42,6 +43,13 @@ MEMORY = np.dtype(
         ("half_length_other", "f8"),
         ("half_width_ego", "f8"),
         ("half_width_other", "f8"),
+        # the situation as it is now (hole H23): role of the ego, FRONT = nobody in its way, and side of the other;
+        # and for how many frames either has been owed an answer: since it came about, or since t_b
+        ("role_now", "i8"),
+        ("role_for", "i8"),
+        ("side_now", "f8"),  # 0 = squarely ahead or behind
+        ("side_for", "i8"),
+        ("w_side", "f8"),  # speed of the ego toward that side when this came about [m/s]
         # first duty that each broke since t_b (`blame.DUTIES`) and the most it was broken by
         ("ego_broke", "i8"),
         ("ego_excess", "f8"),
@@ -91,11 +99,39 @@ def remember(memory, pair, ego, user, dt):
         memory.travel_other += user.along * dt
         memory.approach_ego += memory.side * ego.u * dt + ego.half_width - memory.half_width_ego
         memory.approach_other += -memory.side * user.u * dt + user.half_width - memory.half_width_other
+    _note_situation(memory, pair, min(ego.half_width, user.half_width), user.in_own_lane)
     memory.half_width_ego, memory.half_width_other = ego.half_width, user.half_width
     memory.acceleration_other = (user.speed - memory.speed_other) / dt if memory.age > 0 else 0.0
     memory.speed_other = user.speed
     memory.age += 1
     memory.skipped = False
+
+
+CUT_IN_SPEED = 0.1  # a car ahead is in the ego's way when it comes closer across the lane at this speed [m/s] ...
+CUT_IN_GAP = 0.3  # ... or is nearer than this across the lane [m]
+
+
+@inner
+def _note_situation(memory, pair, narrower, other_in_own_lane):
+    """Who is in the way and who is beside now, and since when; `narrower`: the smaller half width of the two [m].
+
+    While danger lasts, a clock starts anew when the other gets into the ego's way, or comes up on a side.
+    """
+    in_the_way = pair.ego_is_rear and (pair.w_other > CUT_IN_SPEED or pair.gap_lat < CUT_IN_GAP)
+    role = _role(in_the_way, pair.opposite, other_in_own_lane)
+    # who is within the other's width and apart along the lane is no neighbour: going round it is no approach
+    squarely = pair.gap_lon > 0.0 and pair.gap_lat < -narrower
+    side = 0.0 if squarely else pair.side
+    begins = memory.since == 0 or memory.age == 0
+    if begins or (role == FRONT) != (memory.role_now == FRONT):
+        memory.role_for = memory.since if begins else 0
+    else:
+        memory.role_for += 1
+    if begins or side != memory.side_now:
+        memory.side_for, memory.w_side = (memory.since if begins else 0), pair.w_ego
+    else:
+        memory.side_for += 1
+    memory.role_now, memory.side_now = role, side
 
 
 @compiled
@@ -128,18 +164,21 @@ def owes(memory, axis):
 
 # ---------------------------------------------------------------- longitudinal: Def. 4
 
-REAR, FRONT, CORRECT, WRONG = 0, 1, 2, 3
-
 
 @compiled
 def role_of_ego(memory):
     """Longitudinal role of the ego at the threshold: REAR, FRONT, CORRECT or WRONG."""
-    if memory.opposite:
-        # cars that have passed each other owe nothing more than not to reverse
-        if not memory.ego_is_rear:
-            return FRONT
-        return WRONG if memory.in_own_lane else CORRECT
-    return REAR if memory.ego_is_rear else FRONT
+    return _role(memory.ego_is_rear, memory.opposite, memory.in_own_lane)
+
+
+@inner
+def _role(ego_is_rear, opposite, other_in_own_lane):
+    """Longitudinal role of the ego. Cars that have passed each other owe nothing more than not to reverse."""
+    if not ego_is_rear:
+        return FRONT
+    if opposite:
+        return WRONG if other_in_own_lane else CORRECT
+    return REAR
 
 
 @compiled
@@ -246,21 +285,14 @@ class Bounds(NamedTuple):
     right_next: float
 
 
-CUT_IN_SPEED = 0.1  # a car ahead counts as cutting in when it comes closer at this speed [m/s] ...
-CUT_IN_GAP = 0.3  # ... or is nearer than this across the lane [m]
-
-
 @compiled
-def owes_braking(memory, pair, rules):
-    """Must the ego brake for this pair? Returns the reason: 0 none, 1 Def. 4, 2 behind a cut-in (hole H6)."""
+def owes_braking(memory, rules):
+    """Must the ego brake for this pair? Returns why: 0 no, 1 by Def. 4, 2 by the situation as it is now (hole H23)."""
     if memory.since == 0:
         return 0
     if rules.longitudinal and (owes(memory, LON) or not rules.memory) and memory.ego_is_rear:
         return 1
-    cuts_in = pair.w_other > CUT_IN_SPEED or pair.gap_lat < CUT_IN_GAP
-    if rules.brake_behind_cut_in and memory.axes == LAT and pair.ego_is_rear and cuts_in:
-        return 2
-    return 0
+    return 2 if rules.present_duties and memory.role_now != FRONT else 0
 
 
 @compiled
@@ -270,23 +302,40 @@ def owes_lateral_stop(memory, rules):
 
 
 @compiled
-def merge(bounds, memory, pair, params, rules, dt):
-    """Tighten the bounds by what is owed to one pair.
+def owes_no_approach(memory, rules):
+    """Must the ego stop moving toward whoever is beside it now (hole H23)?"""
+    return rules.present_duties and memory.since > 0 and memory.side_now != 0.0
+
+
+@compiled
+def merge(bounds, memory, params, rules, dt):
+    """Tighten the bounds by what is owed to one pair: the duties of the threshold, and those of the situation now.
 
     Longitudinal duties are lower bounds of -a_max_brake and upper bounds of -a_min_brake, so they
     never contradict while a_min_brake <= a_max_brake; lateral ones are limits >= 0 on the two
-    speeds toward the sides.
+    speeds toward the sides. So any number of duties can be kept at once, however long they have been owed.
     """
     a_upper = bounds.a_upper
-    left, right, left_next, right_next = bounds.left, bounds.right, bounds.left_next, bounds.right_next
-    if owes_braking(memory, pair, rules) != 0:
-        inherited = memory.axes == NEVER and rules.brake_if_inherited
+    braking = owes_braking(memory, rules)
+    if braking != 0:
+        inherited = braking == 1 and memory.axes == NEVER and rules.brake_if_inherited
         a_upper = min(a_upper, -params.a_max_brake if inherited else -params.a_min_brake)
+    bounds = Bounds(bounds.a_lower, a_upper, bounds.left, bounds.right, bounds.left_next, bounds.right_next)
     if owes_lateral_stop(memory, rules):
-        now = lateral_speed_limit(memory.since, memory.w_ego, params, dt)
-        soon = lateral_speed_limit(memory.since + 1, memory.w_ego, params, dt)
-        if memory.side > 0.0:
-            right, right_next = min(right, now), min(right_next, soon)
-        else:
-            left, left_next = min(left, now), min(left_next, soon)
-    return Bounds(bounds.a_lower, a_upper, left, right, left_next, right_next)
+        bounds = _slow_down(bounds, memory.side, memory.since, memory.w_ego, params, dt)
+    if owes_no_approach(memory, rules):
+        bounds = _slow_down(bounds, memory.side_now, memory.side_for, memory.w_side, params, dt)
+    return bounds
+
+
+@inner
+def _slow_down(bounds, side, frame, w, params, dt):
+    """Bounds with the lateral speed limit toward one side, as in `lateral_speed_limit`."""
+    now = lateral_speed_limit(frame, w, params, dt)
+    soon = lateral_speed_limit(frame + 1, w, params, dt)
+    left, right, left_next, right_next = bounds.left, bounds.right, bounds.left_next, bounds.right_next
+    if side > 0.0:
+        right, right_next = min(right, now), min(right_next, soon)
+    else:
+        left, left_next = min(left, now), min(left_next, soon)
+    return Bounds(bounds.a_lower, bounds.a_upper, left, right, left_next, right_next)

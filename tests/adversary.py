@@ -77,7 +77,7 @@ EPISODE = np.dtype(
         ("disputed", "i8"),  # ... on which shield and other disagree whether there is danger
         ("danger_lon", "i8"),  # ... in danger, by the axis to respond on
         ("danger_lat", "i8"),
-        ("cut_ins", "i8"),  # frames braked behind a cut-in
+        ("answered_now", "i8"),  # frames braked for who is ahead by now (hole H23)
         ("overridden", "i8"),  # frames
         ("heading", "f8"),  # largest of the ego [rad]
         ("gap_lon", "f8"),  # smallest gap in danger, where this axis has to keep the pair apart [m]
@@ -108,6 +108,7 @@ class World(NamedTuple):
     free_wheel: bool = False  # ... and its lateral speed may jump
     forgetful: bool = False  # memory wiped on every frame
     one_axis: bool = False  # answers only the longitudinal axis where both were lost
+    vice: int = -1  # of everybody; -1 = drawn
 
 
 def world(
@@ -329,8 +330,18 @@ def want(rng, car, target, danger):
     return a, min(max(slip, -MAX_SLIP), MAX_SLIP)
 
 
-ABIDES, BREAKS_DOWN, BRAKES_HARD, NEVER_BRAKES, REVERSES, DRIVES_INTO, SWERVES, DOES_ANYTHING = range(8)
-VICES = ("abides", "breaks down", "brakes hard", "never brakes", "reverses", "drives into", "swerves", "does anything")
+ABIDES, BREAKS_DOWN, BRAKES_HARD, NEVER_BRAKES, REVERSES, DRIVES_INTO, SWERVES, DOES_ANYTHING, OVERTAKES = range(9)
+VICES = (
+    "abides",
+    "breaks down",
+    "brakes hard",
+    "never brakes",
+    "reverses",
+    "drives into",
+    "swerves",
+    "does anything",
+    "overtakes",
+)
 
 
 @compiled
@@ -343,6 +354,8 @@ def misbehave(rng, law, car, ego, a, slip, w):
     if car.vice == DOES_ANYTHING:
         course, heading = turn(car, slip, w.dt)
         return free_a, course, heading
+    if car.vice == OVERTAKES:
+        return _overtake(car, ego, w)
     lawful_a, course, heading = keep_the_law(law, car, a, slip, w)
     if car.vice == BRAKES_HARD:
         return max(min(0.4 * a, w.other.a_max_accel), -car.speed / w.dt), course, heading
@@ -358,6 +371,24 @@ def misbehave(rng, law, car, ego, a, slip, w):
         slip = _arcsin((aim - _own_heading(car)) / max(car.speed * w.dt / HALF_WHEELBASE, 1e-3))
         course, heading = turn(car, min(max(slip, -MAX_SLIP), MAX_SLIP), w.dt)
     return lawful_a, course, heading
+
+
+@compiled
+def _overtake(car, ego, w):
+    """Come from behind with no regard to distance, get ahead, drift into the ego's way, and slow down there for good.
+
+    Once ahead it is gentle: it never brakes harder than 3 m/s^2 nor drifts faster than 1 m/s.
+    """
+    ahead = car.x - ego.x
+    wanted = ego.speed + 4.0 if ahead < w.length + 3.0 else max(ego.speed - 6.0, 0.0)
+    if ahead < -w.length and abs(ego.y - car.y) < CAR_WIDTH + 0.2:  # no room to pass, and it rams nobody
+        wanted = ego.speed + ahead + w.length + 2.0
+    a = min(max((wanted - car.speed) / 0.5, -3.0), w.other.a_max_accel)
+    a = max(a, -car.speed / w.dt)
+    aside = ego.y - car.y if ahead > w.length + 1.0 else 0.0
+    drift = min(max(aside / 0.8, -1.0), 1.0)
+    course = _arcsin(drift / max(car.speed, 10.0))
+    return a, course, course
 
 
 # ---------------------------------------------------------------- where they start
@@ -378,14 +409,16 @@ def _place(rng, car, ego, where, squeeze, w):
         car.speed = _between(rng, 0.0, MAX_SPEED) if rng.random() < 0.9 else 0.0
         if rng.random() < 0.3:
             car.speed = min(max(ego.speed + _between(rng, -3.0, 3.0), 0.0), MAX_SPEED)
-        if squeeze:
+        if squeeze or w.vice == OVERTAKES:
             car.facing, car.speed = 1.0, ego.speed
         bound = w.table.heading_bound
         heading = 0.0 if rng.random() < 0.5 else _between(rng, -bound, bound) * rng.random()
         if not w.lawful:
-            car.vice = _below(rng, len(VICES))
+            car.vice = _below(rng, len(VICES)) if w.vice < 0 else w.vice
             heading = _between(rng, -1.5, 1.5) if rng.random() < 0.2 else heading
             car.wreck = rng.random() < 0.1
+            if w.vice == OVERTAKES:  # beside or just behind, straight along the road
+                heading, car.wreck = 0.0, False
             if car.wreck:  # a box that stands on the road
                 car.length = car.width = OBSTACLE_SIZE
                 car.speed, heading, car.facing = 0.0, 0.0, 1.0
@@ -404,6 +437,8 @@ def _place(rng, car, ego, where, squeeze, w):
         else:
             car.x, car.y = ego.x + _between(rng, -12.0, 12.0), ego.y + sign * 1e-6
             car.y += sign * (spare - margins(ego, car, w)[1])
+        if w.vice == OVERTAKES:
+            car.x, car.y = ego.x - _between(rng, 0.5, 12.0), ego.y + sign * _between(rng, 2.2, 3.2)
         lon, lat = margins(ego, car, w)
         now, soon = contact(ego, car, w.dt)
         if (max(lon, lat) >= 0.0) == w.start_safe and not now and not soon:
@@ -434,7 +469,7 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
     danger = find_danger(seen, users, last[w.others], last, memory, w.ego, w.other, w.rules, w.dt)
     response = respond(nominal, danger, seen, BODY, w.rules, w.dt)
     result.overridden += response.overridden
-    result.cut_ins += (danger.response & 4) != 0
+    result.answered_now += (danger.response & 4) != 0
     a, slip = response.command
     if w.one_axis:
         for i in range(w.others):
@@ -452,8 +487,7 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
     if w.steering.heading_bound != w.rules.heading_bound:
         bounds = always_on(seen, w.ego, w.rules, w.dt)
         for i in range(w.others):
-            pair = assess(seen, users[i], w.ego, w.other, w.rules, w.dt)
-            bounds = merge(bounds, memory[i], pair, w.ego, w.rules, w.dt)
+            bounds = merge(bounds, memory[i], w.ego, w.rules, w.dt)
         a, slip = restrict(nominal, bounds, seen, BODY, w.steering, w.dt)
     return Command(a, slip)
 
@@ -490,7 +524,7 @@ def episode(rng, w, result, film):
     ego.length, ego.width, ego.facing = w.length, CAR_WIDTH, 1.0
     ego.speed = _between(rng, 0.0, MAX_SPEED) if rng.random() < 0.95 else 0.0
     bound = w.table.heading_bound
-    ego.heading = 0.0 if rng.random() < 0.5 else _between(rng, -bound, bound) * rng.random()
+    ego.heading = 0.0 if rng.random() < 0.5 or w.vice == OVERTAKES else _between(rng, -bound, bound) * rng.random()
     ego.u, ego.along = ego.speed * np.sin(ego.heading), ego.speed * np.cos(ego.heading)
     may_reverse = not w.shielded and rng.random() < 0.3
     squeeze = rng.random() < 0.2

@@ -213,8 +213,8 @@ def test_behind_a_cut_in_nobody_brakes_there_but_the_ego_does_here():
     assert lon.response == getattr(rss.state.LongitudinalResponse, "None")
     assert right.response == rss.state.LateralResponse.BrakeMin
     assert memory["axes"] == LAT and memory["since"] == 1
-    assert owes_braking(memory, pair, Rules()) == 2
-    assert owes_braking(memory, pair, Rules(brake_behind_cut_in=False)) == 0
+    assert owes_braking(memory, Rules()) == 2
+    assert owes_braking(memory, Rules(present_duties=False)) == 0
 
 
 def test_reversing_cars_are_an_input_error_there():

@@ -20,6 +20,9 @@ from shield.params import PRESETS
 SLOW = 1 / 15  # [s]
 FAST = 1 / 5
 
+# the duties of the situation now (H23) would make up for a lost duty of the threshold: off, to see that one alone
+LETTER = dict(present_duties=False)
+
 MUTATIONS = {
     "C1 acceleration unlimited outside duties": (dict(free_throttle=True), FAST, 1, "contact"),
     "C1y lateral speed may jump outside duties": (dict(free_wheel=True), FAST, 2, "contact"),
@@ -28,14 +31,14 @@ MUTATIONS = {
     "C3 a P controller for a brake": (dict(soft_brake=True), FAST, 1, "contact"),
     "C5 no margins for frames": (dict(table=dict(discretisation_margin=False)), FAST, 1, "contact"),
     "C6 started in danger": (dict(start_safe=False), FAST, 1, "contact"),
-    "C7 which axis was safe is forgotten": (dict(rules=dict(memory=False)), SLOW, 1, "contact"),
+    "C7 which axis was safe is forgotten": (dict(rules=dict(memory=False, **LETTER)), SLOW, 1, "contact"),
     "C7 memory wiped on every frame": (dict(forgetful=True), SLOW, 1, "contact"),
-    "C7 only one of two lost axes answered": (dict(one_axis=True), FAST, 1, "broken"),
+    "C7 only one of two lost axes answered": (dict(one_axis=True, rules=LETTER), FAST, 1, "broken"),
     "C8 no room for predicted contact": (dict(rules=dict(overlap_margin=0.0)), FAST, 1, "broken"),
     "heading bound off": (dict(steering=dict(heading_bound=1.0)), FAST, 1, "heading"),
     "credit for receding, three cars": (dict(rules=dict(no_credit=False)), FAST, 2, "contact"),
-    "no lateral duty": (dict(rules=dict(lateral=False)), FAST, 1, "contact"),
-    "no longitudinal duty": (dict(rules=dict(longitudinal=False)), FAST, 1, "contact"),
+    "no lateral duty": (dict(rules=dict(lateral=False, **LETTER)), FAST, 1, "contact"),
+    "no longitudinal duty": (dict(rules=dict(longitudinal=False, **LETTER)), FAST, 1, "contact"),
 }
 
 

@@ -26,7 +26,7 @@ def test_started_safe_and_among_the_lawful_nobody_is_touched(others, dt, bare):
     assert (episodes["overridden"] > 0).mean() > 0.4
     assert (episodes["danger_lon"] > 0).mean() > 0.1
     assert (episodes["danger_lat"] > 0).mean() > 0.1
-    assert (episodes["cut_ins"] > 0).any()
+    assert (episodes["answered_now"] > 0).any()
 
 
 def random_car(rng):
