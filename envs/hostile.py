@@ -14,6 +14,7 @@ class HostileVehicle(IDMVehicle):
     """An IDM driver with its eye on a victim; what it does to it is `harass`'s."""
 
     REVERSES = False
+    action: dict[str, float]
 
     def act(self, action=None) -> None:
         super().act(action)
