@@ -75,6 +75,7 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
         "episode_dangerous_pairs": ego.dangerous_pairs,
         "episode_broken_duties": ego.broken_duties,
         "min_ttc": min(ego.min_ttc, LONGEST_TTC),
+        **(ego.meter.info() if ego.meter is not None else {}),
     }
 
 
