@@ -26,6 +26,7 @@ class RiskFrame(NamedTuple):
     upper: float
     state: int  # its class: index into `STATES`
     partner: int  # its index in `road.vehicles`, static objects after them; -1 = nobody
+    largest: float  # largest RDSI of one source
     total: float  # sum of all sources and lane markings
     state_of_total: int
     ttc: float  # toward the leader [s]
@@ -57,8 +58,12 @@ class RiskMeter:
     def __init__(self, settings: RiskSettings) -> None:
         self.settings = settings
         self.frames: list[RiskFrame] = []
-        self.seen = 0  # frames before this step
+        self.before = 0  # frames before this step
         self.dt = 0.0
+
+    def begin_step(self) -> None:
+        """Infos are about the frames from here on."""
+        self.before = len(self.frames)
 
     def look(self, ego: ShieldedEgo) -> None:
         """Take in one frame."""
@@ -83,6 +88,7 @@ class RiskMeter:
                 risk.upper,
                 risk.state,
                 ego._index_on_road(risk.critical) if risk.critical >= 0 else -1,
+                risk.largest,
                 risk.total,
                 risk.state_of_total,
                 lead.ttc,
@@ -92,9 +98,9 @@ class RiskMeter:
         )
 
     def info(self) -> dict[str, Any]:
-        """What infos say of this step, and since reset; see `ShieldWrapper`. The next step begins after it."""
+        """What infos say of this step, and since reset; see `ShieldWrapper`."""
         # after a contact there are no more frames, and the last one counts on
-        step, self.seen = self.frames[self.seen :] or self.frames[-1:] or [_NOTHING], len(self.frames)
+        step = self.frames[self.before :] or self.frames[-1:] or [_NOTHING]
         worst = max(step, key=lambda frame: (frame.state, frame.rdsi / frame.upper))
         times, rdsi, lower, upper, states = np.array(self.frames or [_NOTHING])[:, :5].T
         seconds = np.bincount(states.astype(int), minlength=len(STATES)) * self.dt
@@ -106,13 +112,15 @@ class RiskMeter:
                 "upper": worst.upper,
                 "state": STATES[worst.state],
                 "partner": worst.partner,
+                "largest": max(frame.largest for frame in step),
                 "total": max(frame.total for frame in step),
                 "state_of_total": STATES[max(frame.state_of_total for frame in step)],
                 "ttc": min(frame.ttc for frame in step),
                 "thw": min(frame.thw for frame in step),
                 "drac": max(frame.drac for frame in step),
             },
-            "max_rdsi": float(rdsi.max()),
+            "max_rdsi": max((frame.largest for frame in self.frames), default=0.0),
+            "max_total_rdsi": max((frame.total for frame in self.frames), default=0.0),
             **{f"time_{name}": float(time) for name, time in zip(STATES, seconds, strict=True)},
             "band_risk": band_risk(times, rdsi, lower, upper, least_stay=least_stay).total,
             "min_thw": min([LONGEST_TTC, *(frame.thw for frame in self.frames)]),
@@ -120,7 +128,7 @@ class RiskMeter:
         }
 
 
-_NOTHING = RiskFrame(0.0, 0.0, 1.0, 1.0, 0, -1, 0.0, 0, np.inf, np.inf, 0.0)
+_NOTHING = RiskFrame(0.0, 0.0, 1.0, 1.0, 0, -1, 0.0, 0.0, 0, np.inf, np.inf, 0.0)
 
 
 def _sources(poses: np.ndarray, settings: RiskSettings) -> np.ndarray:

@@ -34,6 +34,8 @@ def attach(
 def begin_step(ego: ShieldedEgo) -> bool:
     """Start counting anew; returns whether the ego has had its contact before this step."""
     ego.tally = StepTally()
+    if ego.meter is not None:
+        ego.meter.begin_step()
     return ego.contact is not None
 
 

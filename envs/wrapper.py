@@ -68,10 +68,11 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
       is_success: has the ego reached its goal? Only where there is one: past an intersection, on the exit
         (after a step).
       risk: only with the option `risk`: of the worst frame of this step `rdsi`, its thresholds `lower` and `upper`,
-        `state` ("known_safe", "unknown", "known_unsafe") and `partner`; the largest `total` over all sources and lane
-        markings, with `state_of_total`; and toward the leader the smallest `ttc`, `thw` [s] and largest `drac`
-        [m/s^2]. Since reset: max_rdsi, time_known_safe, time_unknown, time_known_unsafe [s], band_risk (integral of
-        RDSI over the stays in the unknown [s]), min_thw (at most 100), max_drac. See `shield.risk`.
+        `state` ("known_safe", "unknown", "known_unsafe") and `partner`; the `largest` of one source and the largest
+        `total` of all and of lane markings, with `state_of_total`; and toward the leader the smallest `ttc`, `thw` [s]
+        and the largest `drac` [m/s^2]. Since reset: max_rdsi (of one source), max_total_rdsi, time_known_safe,
+        time_unknown, time_known_unsafe [s], band_risk (integral of RDSI over the stays in the unknown [s]), min_thw
+        (at most 100), max_drac. See `shield.risk`.
       traffic_blame: with compliant traffic, the verdicts of all other cars that have had a contact, each from its
         own view.
 

@@ -11,7 +11,16 @@ from envs import MultiAgentShield, ShieldWrapper, make
 from envs.risk import _line
 from shield.risk import STATES, RiskSettings, band_risk
 
-EPISODE = ("max_rdsi", "time_known_safe", "time_unknown", "time_known_unsafe", "band_risk", "min_thw", "max_drac")
+EPISODE = (
+    "max_rdsi",
+    "max_total_rdsi",
+    "time_known_safe",
+    "time_unknown",
+    "time_known_unsafe",
+    "band_risk",
+    "min_thw",
+    "max_drac",
+)
 
 
 def first_frame(name, mode, lane=1, side=0):
@@ -102,7 +111,8 @@ def test_infos_sum_up_the_frames_of_the_episode(env_id):
         times, rdsi, lower, upper, states = np.array(env.risk_frames)[:, :5].T
         dt = env.settings.dt
         assert np.diff(times) == pytest.approx(dt)
-        assert info["max_rdsi"] == rdsi.max() > 0.0
+        assert info["max_rdsi"] == max(frame.largest for frame in env.risk_frames) >= rdsi.max() > 0.0
+        assert info["max_total_rdsi"] == max(frame.total for frame in env.risk_frames)
         assert [info[f"time_{name}"] for name in STATES] == pytest.approx(
             [dt * np.sum(states == state) for state in range(3)]
         )
