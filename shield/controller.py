@@ -8,6 +8,7 @@ from shield.chosen import how_many, which
 from shield.command import Command
 from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
+from shield.kinematics import time_to_collision
 from shield.pair import assess, leading_speed, least_cosine, least_margin, own_share, toward
 from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, owes_no_approach, remember
 
@@ -124,7 +125,7 @@ def find_danger(
         if margin < worst:
             worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat
         if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
-            ttc = min(ttc, max(pair.gap_lon, 0.0) / (pair.v_ego - pair.v_other))
+            ttc = min(ttc, time_to_collision(pair.gap_lon, pair.v_ego - pair.v_other))
     return Danger(free, bounds, dangerous, partner, margin_lon, margin_lat, response, ttc)
 
 
