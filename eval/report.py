@@ -15,6 +15,7 @@ from eval.files import atomic, write_json
 from eval.metrics import differences, summarise
 from eval.plots import plot_blame, plot_learning_curve
 from eval.replay import compare, verdict
+from eval.run_folder import changes
 from eval.table import print_table, write_table
 
 SHIELD = {"unshielded": "off", "shielded": "on"}  # arm -> shield while training
@@ -74,7 +75,8 @@ def write_report(folder: Path) -> None:
 
 def _given(option: str, values: dict[str, Any]) -> str:
     """What replaces the defaults of an environment or a preset: " (config.lanes_count 4)"; empty if nothing does."""
-    return f" ({', '.join(f'{option}.{name} {value}' for name, value in values.items())})" if values else ""
+    named = [f"{option}.{name} {value}" for name, value, _ in changes(values, {})]
+    return f" ({', '.join(named)})" if named else ""
 
 
 def _penalty(config: dict[str, Any]) -> str:
