@@ -73,25 +73,25 @@ def check_config(env_id: str, config: Mapping[str, Any]) -> None:
                 raise ValueError(f"{name} is not known to {env_id}; the nearest is config.{_nearest(key, known)}")
             _check_value(name, value, 0.0)
         elif key in TYPES:
-            _check_typed(name, value, TYPES[key])
+            _check_typed(name, value, defaults[key], TYPES[key])
         else:
             _check_value(name, value, defaults[key])
             if isinstance(value, Mapping):
                 _check_names(name, value, defaults[key])
 
 
-def _check_typed(name: str, config: Any, types: Mapping[str, type]) -> None:
+def _check_typed(name: str, config: Any, default: Mapping[str, Any], types: Mapping[str, type]) -> None:
     """An observation or an action: "type" says which, the rest are its parameters."""
-    _check_value(name, config, {})
+    _check_value(name, config, default)
     kind = config.get("type")
     if kind not in types:
         near = f"; the nearest is {_nearest(kind, types)}" if isinstance(kind, str) else ""
         raise ValueError(f"{name}.type = {kind!r}: expected one of {', '.join(types)}{near}")
-    known = _parameters(types[kind])
-    _check_names(name, config, ["type", *known])
+    # a default may hold keys that its own type ignores
+    known = {**(default if kind == default["type"] else {"type": kind}), **_parameters(types[kind])}
+    _check_names(name, config, known)
     for key, value in config.items():
-        if key != "type":
-            _check_value(f"{name}.{key}", value, known[key])
+        _check_value(f"{name}.{key}", value, known[key])
 
 
 def _check_names(name: str, config: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -104,7 +104,9 @@ def _check_value(name: str, value: Any, default: Any) -> None:
     """A value must be of the default's kind; anything goes where there is no default."""
     if name.endswith("_count") and not (_is_number(value) and value == int(value) and value >= 0):
         raise ValueError(f"{name} = {value!r}: expected a whole number >= 0")
-    if name.endswith("_range") and not _is_range(value):
+    if value is None and default is None:
+        return
+    if name.endswith("_range") and not (_is_range(value) or isinstance(value, Mapping)):
         raise ValueError(f"{name} = {value!r}: expected two numbers, the smaller first")
     if isinstance(default, bool):
         good, expected = isinstance(value, bool), "true or false"

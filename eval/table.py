@@ -1,5 +1,6 @@
 """The comparison as one table: in the terminal, as plain text, Markdown, LaTeX and CSV."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ LEGEND = (
     "these trained models (rates Wilson, others bootstrap). (low, high): the same over training seeds, so what other "
     "seeds may give (Student's t of the seeds' values, at least as wide as the first; – for a single seed)."
 )
-MORE_DIGITS = 9  # closer than its last one to a limit is at the limit
+MOST_DIGITS = 9  # what is closer to a limit is at the limit
 GOAL_LEGEND = (
     " success: % of the n test episodes that reached the goal without a contact; time to goal: mean of those episodes."
 )
@@ -56,14 +57,12 @@ def with_intervals(numbers: np.ndarray, digits: int, limits: tuple[float, ...] =
 
 
 def rounded(number: float, digits: int, limits: tuple[float, ...] = ()) -> str:
-    """At least `digits` decimals, and as many as keep it from looking like zero or a limit that it is not."""
+    """At least `digits` decimals, and so many that it does not look like zero or a limit that it is only close to."""
     if np.isnan(number):
         return "–"
-    for decimals in range(digits, digits + MORE_DIGITS):
-        text = f"{number:z.{decimals}f}"
-        if all(float(text) != limit or abs(number - limit) < 10.0**-MORE_DIGITS for limit in (0.0, *limits)):
-            break
-    return text
+    away = min(abs(number - limit) for limit in (0.0, *limits))
+    needed = math.ceil(-math.log10(away)) if 10.0**-MOST_DIGITS < away < 1 else 0
+    return f"{number:z.{max(digits, needed)}f}"
 
 
 def write_table(summary: pd.DataFrame, folder: Path, title: str, note: str = "") -> None:
