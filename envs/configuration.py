@@ -102,8 +102,9 @@ def _check_names(name: str, config: Mapping[str, Any], known: Iterable[str]) -> 
 
 def _check_value(name: str, value: Any, default: Any) -> None:
     """A value must be of the default's kind; anything goes where there is no default."""
-    if name.endswith("_count") and not (_is_number(value) and value == int(value) and value >= 0):
-        raise ValueError(f"{name} = {value!r}: expected a whole number >= 0")
+    least = int(name.endswith("lanes_count"))
+    if name.endswith("_count") and not (_is_number(value) and value == int(value) and value >= least):
+        raise ValueError(f"{name} = {value!r}: expected a whole number >= {least}")
     if value is None and default is None:
         return
     if name.endswith("_range") and not (_is_range(value) or isinstance(value, Mapping)):
