@@ -1,32 +1,42 @@
 """Train PPO with and without the RSS shield, test each with and without it, and report who crashes."""
 
+from eval.interrupt import stop_on_interrupt
+
+if __name__ == "__main__":  # before all that takes its time
+    stop_on_interrupt("train.py: stopping; nothing that is finished is lost, the same command with --resume goes on")
+
 import contextlib
 import functools
+import hashlib
 import io
+import json
 import math
 import multiprocessing
 import os
 import re
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import gymnasium as gym
+import numpy as np
 import tyro
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 import envs
-from agents.ppo import available_devices, load_policy, rounded_timesteps, train
+from agents.ppo import available_devices, hyperparameters, load_policy, rounded_timesteps, train
+from envs.configuration import check_config, default_config
 from envs.highway import PLANS
 from envs.vector import BACKENDS
 from envs.wrapper import WAITING, default_preset, scheme_of
+from eval.config_option import read_config, split_arguments, with_values
 from eval.jobs import Job, run_jobs
 from eval.replay import chosen, replay
 from eval.report import cell_path, read_cell, replay_path, write_cell, write_report
 from eval.rollout import evaluate
-from eval.run_folder import open_run
+from eval.run_folder import changes, open_run, recorded
 from shield.junction import ENTRIES
 from shield.params import PRESETS, Preset, RSSParams, Rules
 from shield.plans import INTENTS
@@ -54,12 +64,19 @@ examples:
       another road, stricter assumptions
   python train.py --ego.response-time 0.5 --other.a-min-brake 4
       single RSS parameters
+  python train.py --config.lanes-count 4 --config.reward-speed-range 20 35
+      the environment's configuration, key by key
+  python train.py --config my-road.json --config.observation.vehicles-count 8
+      the same from a file; what the command line says wins
   python train.py --arms shielded --intervention-penalty 0.1
       one arm, which pays for what the shield must correct
-  python train.py --resume
+  python train.py --resume --name my-run
       go on with a run that was stopped, with the options it was started with
 """
 Progress = Callable[[int], None]
+NAMES = "letters, digits and . , = + - _"
+LONGEST_NAME = 120
+DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
 FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
 
 
@@ -79,12 +96,28 @@ class Overrides:
     v_cap: float | None = None  # [m/s], > 0: speed above which nobody accelerates
 
 
+# a file is read where the command line is
+ConfigFile = Annotated[
+    dict[str, Any],
+    tyro.constructors.PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="FILE",
+        instance_from_str=lambda texts: read_config(texts[0]),
+        is_instance=lambda value: isinstance(value, dict),
+        str_from_instance=lambda value: [json.dumps(value)],
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Config:
     """What `python train.py --help` shows; one option a field."""
 
     env_id: str = "highway-fast-v0"
     """Environment of highway-env."""
+    config: ConfigFile = field(default_factory=dict)
+    """Its configuration, a JSON, TOML or YAML file or JSON itself, as make() takes it; single keys as
+    --config.lanes-count 4, nested ones as --config.observation.type Kinematics."""
     backend: str = "fast"
     """What simulates: fast (the compiled engine, with the same trajectories) or highway-env (the original)."""
     arms: tuple[str, ...] = ("unshielded", "shielded")
@@ -120,36 +153,26 @@ class Config:
     device: str = "cpu"
     """Where PPO learns: cpu, cuda or auto. For networks this small the CPU is faster."""
     name: str = ""
-    """Folder of the run inside runs-dir; by default made from the options that differ from theirs."""
+    """Folder of the run inside runs-dir; by default made from the options that differ from their defaults."""
     runs_dir: Path = Path("runs")
     """Folder of all runs."""
     resume: bool = False
-    """Go on with the run in the folder; nothing that is finished is repeated."""
+    """Go on with the run in the folder, with the options it was started with; nothing that is finished is
+    repeated. Options that are given as well must be the same."""
     overwrite: bool = False
     """Throw the run in the folder away and start anew."""
 
 
 def main(arguments: list[str]) -> None:
-    config = parse(arguments)
-    check(config)
-    name = config.name or run_name(config)
     try:
-        config = replace(config, preset=preset_name(config))
+        config, folder = started(arguments)
         preset = resolve(config)
-        for mode in TEST_MODE.values():
-            env = original(config, preset, mode)()  # a bad value shows now
-            env.close()
-            if not isinstance(env.action_space, gym.spaces.Discrete):
-                raise ValueError(f"env_id = {config.env_id!r}: actions {env.action_space}; expected Discrete ones")
-        batch(config, preset, "override", n_envs=1).reset(seed=0)  # and the engine is compiled once for all workers
-        folder = config.runs_dir / name
-        changes = open_run(
-            folder, record(config, preset, scheme_of(env.unwrapped)), resume=config.resume, overwrite=config.overwrite
-        )
+        env = tried(config, preset)
+        warnings = open_run(folder, record(config, preset, env), resume=config.resume, overwrite=config.overwrite)
     except (ValueError, OSError) as error:
-        fail(str(error))
-    for change in changes:
-        print(f"train.py: warning: {change}", file=sys.stderr)
+        fail(" ".join(str(error).split()))
+    for warning in warnings:
+        print(f"train.py: warning: {warning}", file=sys.stderr)
 
     models = [(arm, seed) for seed in config.seeds for arm in config.arms]
     cells = [(arm, seed, test) for arm, seed in models for test in TEST_MODE]
@@ -165,20 +188,122 @@ def main(arguments: list[str]) -> None:
     print(f"\nEverything is in {folder}: table.md, results.json, learning_curve.png, blame.png, ...")
 
 
+def started(arguments: list[str]) -> tuple[Config, Path]:
+    """All options, and the folder of the run. What `--resume` finds there are the defaults of the rest.
+
+    Raises:
+      ValueError: the environment's configuration cannot be read, or options contradict those of the run.
+    """
+    options, values = split_arguments(arguments)
+    config = parse(options, Config())
+    check(config)
+    before = recorded(config.runs_dir / config.name) if config.resume and config.name else None
+    if before is None:
+        config = complete(config, values)
+        config = replace(config, name=config.name or run_name(config))
+        before = recorded(config.runs_dir / config.name) if config.resume else None
+    folder = config.runs_dir / config.name
+    if before is None:
+        if config.resume:
+            print(f"train.py: nothing to resume in {folder}: a new run is started there", file=sys.stderr)
+        return replace(config, preset=preset_name(config)), folder
+    stored = stored_config(before)
+    config = parse(options, stored)
+    config = complete(replace(config, config={**stored.config, **config.config}), values)
+    config = replace(config, preset=preset_name(config))
+    contradictions = [
+        f"--{name.replace('_', '-')} {shown(now)} contradicts {shown(then)}"
+        for name, now, then in changes(options_of(config), options_of(stored))
+    ]
+    if contradictions:
+        raise ValueError(
+            f"{', '.join(contradictions)}, with which the run in {folder} was started; "
+            "leave them out to go on with it, --overwrite starts it anew, --name chooses another folder"
+        )
+    return config, folder
+
+
+def complete(config: Config, values: dict[tuple[str, ...], Any]) -> Config:
+    """Options that are all in range, the environment's configuration with its single values put in."""
+    check(config)
+    if not (config.config or values):
+        return config
+    given = with_values(config.config, values, default_config(config.env_id))
+    check_config(config.env_id, given)
+    return replace(config, config=given)
+
+
+def stored_config(options: dict[str, Any]) -> Config:
+    """The options in a run's record; what was not recorded has its default."""
+    known = {f.name: options[f.name] for f in fields(Config) if f.name in options}
+    for name in ("arms", "seeds"):
+        known[name] = tuple(known[name])
+    for name in ("ego", "other"):
+        known[name] = Overrides(**{parameter: float(value) for parameter, value in known[name].items()})
+    return Config(**known)
+
+
+def tried(config: Config, preset: Preset) -> gym.Env:
+    """The original environment, after bad values of any kind have shown.
+
+    Raises:
+      ValueError: says what is wrong, and with which keys of the environment's configuration.
+    """
+    try:
+        return _tried(config, preset)
+    except Exception as error:
+        if not config.config or not _works(replace(config, config={}), preset):
+            raise
+        alone = [{key: value} for key, value in config.config.items()]
+        bad = [one for one in alone if not _works(replace(config, config=one), preset)] or alone
+        named = ", ".join(f"config.{key} = {value!r}" for one in bad for key, value in one.items())
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+        raise ValueError(f"{named}: not possible in {config.env_id}: {kind}{error}") from error
+
+
+def _works(config: Config, preset: Preset) -> bool:
+    try:
+        _tried(config, preset)
+    except Exception:
+        return False
+    return True
+
+
+def _tried(config: Config, preset: Preset) -> gym.Env:
+    env = original(config, preset, "override")()
+    env.close()
+    actions, observations = env.action_space, env.observation_space
+    if not isinstance(actions, gym.spaces.Discrete):
+        raise ValueError(f"env_id = {config.env_id!r}: actions {actions}; expected Discrete ones")
+    if not (isinstance(observations, gym.spaces.Box) and np.issubdtype(observations.dtype, np.floating)):
+        raise ValueError(f"env_id = {config.env_id!r}: observations {observations}; expected a Box of floats")
+    first = batch(config, preset, "override", n_envs=1)
+    first.reset(seed=0)
+    first.step(np.zeros(1, int))  # and the engine is compiled once for all workers
+    first.close()
+    return env
+
+
 def original(config: Config, preset: Preset, mode: str) -> Callable[..., gym.Env]:
     """Builds an environment of the original simulator."""
-    return functools.partial(envs.make, config.env_id, shield=mode, params=preset, **conduct(config))
+    return functools.partial(envs.make, config.env_id, shield=mode, params=preset, **setting(config))
 
 
 def batch(config: Config, preset: Preset, mode: str, n_envs: int, **options: Any) -> VectorEnv:
     """Environments of the chosen simulator side by side."""
-    options |= {"backend": config.backend, "params": preset, **conduct(config)}
+    options |= {"backend": config.backend, "params": preset, **setting(config)}
     return envs.make_vec(config.env_id, n_envs, shield=mode, **options)
 
 
-def conduct(config: Config) -> dict[str, Any]:
-    """How the ego behaves where roads cross."""
-    return {"entry": config.entry, "intent": config.intent, "waiting": config.waiting}
+def setting(config: Config) -> dict[str, Any]:
+    """The environment's configuration, and how the ego behaves where roads cross."""
+    conduct = {"entry": config.entry, "intent": config.intent, "waiting": config.waiting}
+    return {**conduct, **configured(config)}
+
+
+def configured(config: Config) -> dict[str, Any]:
+    """The environment's configuration, if it is told any."""
+    return {"config": config.config} if config.config else {}
 
 
 def model_path(folder: Path, arm: str, seed: int) -> Path:
@@ -231,13 +356,18 @@ def _replay(config: Config, preset: Preset, folder: Path, arm: str, seed: int, t
     write_cell(replay_path(folder, arm, seed, test), replays, arm, seed, test)
 
 
-def parse(arguments: list[str]) -> Config:
+def parse(arguments: list[str], default: Config) -> Config:
     """Read the command line. What cannot be read ends in one line and exit code 2."""
     printed = io.StringIO()
     try:
         with contextlib.redirect_stderr(printed):
             return tyro.cli(
-                Config, prog="train.py", description=HELP, args=arguments, config=(tyro.conf.FlagCreatePairsOff,)
+                Config,
+                prog="train.py",
+                description=HELP,
+                args=arguments,
+                default=default,
+                config=(tyro.conf.FlagCreatePairsOff,),
             )
     except SystemExit as stop:
         if not stop.code:  # --help
@@ -265,13 +395,12 @@ def check(config: Config) -> None:
         ("n_envs", 1 <= config.n_envs <= 4096, "1 to 4096"),
         ("workers", 1 <= config.workers <= 256, "1 to 256"),
         ("device", config.device in devices, f"one of {', '.join(devices)} on this machine"),
-        ("name", re.fullmatch(r"([\w=][\w=.,+-]*)?", config.name), "letters, digits and . , = + - _"),
+        ("name", config.name in ("", valid_name(config.name)), f"{NAMES}, such as {valid_name(config.name)}"),
         ("resume", not (config.resume and config.overwrite), "--resume or --overwrite, not both"),
     ):
         if not good:
-            value = getattr(config, option)
-            shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
-            fail(f"--{option.replace('_', '-')} {shown} is out of range: expected {expected}")
+            value = shown(getattr(config, option))
+            fail(f"--{option.replace('_', '-')} {value} is out of range: expected {expected}")
 
 
 def is_set_of(values: tuple, accepted: Sequence) -> bool:
@@ -303,35 +432,52 @@ def resolve(config: Config) -> Preset:
     return preset
 
 
-def record(config: Config, preset: Preset, scheme: int) -> dict[str, Any]:
-    """All that the result depends on: every option but those that only say where and how to start."""
+def options_of(config: Config) -> dict[str, Any]:
+    """Every option but those that only say where and how to start."""
     options = {f.name: getattr(config, f.name) for f in fields(config) if f.name not in _NOT_RECORDED}
+    return {**options, "ego": _given(config.ego), "other": _given(config.other)}
+
+
+def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
+    """All that the result depends on."""
     parameters = {"ego": preset.ego._asdict(), "other": preset.other._asdict()}
-    return {**options, "ego": _given(config.ego), "other": _given(config.other)} | {
+    return {
+        **options_of(config),
         "parameters": {
             **parameters,
             "per_frame": preset.per_frame,
             "source": preset.source,
-            "roads_cross": scheme == PLANS,  # otherwise entry, intent and waiting change nothing
+            "roads_cross": scheme_of(env.unwrapped) == PLANS,  # otherwise entry, intent and waiting change nothing
             "rules": Rules()._asdict(),  # the margins of the published table
-        }
+        },
+        "environment": env.unwrapped.config,  # type: ignore[attr-defined]  # the whole of it
+        "ppo": hyperparameters(config.n_envs, config.total_timesteps),
+        "test_seeds": {"first": FIRST_TEST_SEED, "last": FIRST_TEST_SEED + config.eval_episodes - 1},
     }
 
 
 def run_name(config: Config) -> str:
     """The environment, then every option that differs from its default."""
-    default = Config()
-    parts = [config.env_id]
-    for option in fields(config):
-        value = getattr(config, option.name)
-        if option.name in (*_NOT_RECORDED, "env_id") or value == getattr(default, option.name):
-            continue
-        if isinstance(value, Overrides):
-            parts += [f"{option.name}.{name}={number}" for name, number in _given(value).items()]
-        else:
-            shown = "-".join(map(str, value)) if isinstance(value, tuple) else value
-            parts.append(f"{option.name}={shown}")
-    return ",".join(parts)
+    chosen_options = changes(options_of(config), options_of(Config()))
+    parts = [f"{name}={shown(value, '-')}" for name, value, _ in chosen_options if name != "env_id"]
+    return valid_name(",".join([config.env_id, *parts]))
+
+
+def valid_name(text: str) -> str:
+    """A name of a folder that every system takes: no / \\ : * ? " < > |, no dot at an end, no device, not too long."""
+    name = re.sub(r"[^\w=.,+-]+", "-", text).strip("-.")
+    if name.split(".")[0].upper() in DEVICES:
+        name = f"_{name}"
+    if len(name) > LONGEST_NAME:
+        name = f"{name[: LONGEST_NAME - 9]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+    return name
+
+
+def shown(value: Any, separator: str = " ") -> str:
+    """A value as on a command line."""
+    if value is None:
+        return "(not given)"
+    return separator.join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
 _NOT_RECORDED = ("workers", "name", "runs_dir", "resume", "overwrite")
@@ -349,8 +495,4 @@ def fail(message: str) -> NoReturn:
 if __name__ == "__main__":
     # worker processes are forked from a server that has imported the slow packages once
     multiprocessing.set_forkserver_preload(["envs", "agents.ppo", "eval.jobs", "eval.rollout"])
-    try:
-        main(sys.argv[1:])
-    except KeyboardInterrupt:
-        print("\ntrain.py: stopped; the same command with --resume goes on", file=sys.stderr)
-        raise SystemExit(130) from None
+    main(sys.argv[1:])

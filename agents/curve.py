@@ -1,26 +1,39 @@
-"""The learning curve: one CSV row per training episode, written while training."""
+"""The learning curve: one CSV row per training episode, written while training.
+
+An episode that the end of a block of training cuts off has a row as well: long episodes are cut off more
+often than short ones, so rows of the finished ones alone would show too many early ends, that is, crashes.
+"""
 
 import csv
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TextIO
 
+import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
+from agents.vec_env import one
+
+NO_CONTACT = "no contact"  # an empty text would come back from a CSV file as a missing value
 COLUMNS = (
-    "timesteps",  # decisions of all environments together when the episode ended
+    "timesteps",  # decisions of all environments together when the episode ended or was cut off
+    "started",  # ... and when it began
+    "cut",  # 1: the block of training ended first; what the row says is how far the episode got
     "return",  # sum of rewards
     "length",  # decisions
     "crashed",  # 1: the car touched somebody
-    "blame",  # who broke their duty: ego, both, other, inherited, none, or empty without contact
+    "blame",  # who broke their duty: ego, both, other, inherited, none, or NO_CONTACT
     "override_share",  # share of simulation frames in which the shield overrode the command
     "cost",  # sum of info["cost"]
 )
 
 
 class CurveRecorder(BaseCallback):
-    """Appends a row to a CSV file whenever an episode ends, and tells TensorBoard the means.
+    """Appends a row to a CSV file whenever an episode ends or is cut off, and tells TensorBoard the rates.
+
+    TensorBoard gets rates per decision: means over the episodes that happen to end would depend on
+    their lengths.
 
     Args:
       path: CSV file; `truncate_curve` has written its header.
@@ -35,32 +48,55 @@ class CurveRecorder(BaseCallback):
 
     def _on_training_start(self) -> None:
         self.file = self.path.open("a", newline="", encoding="utf-8")
+        self.returns = np.zeros(self.training_env.num_envs)
+        self.lengths = np.zeros(self.training_env.num_envs, int)
 
     def _on_step(self) -> bool:
-        for done, info in zip(self.locals["dones"], self.locals["infos"], strict=True):
-            if done:
-                row = episode_row(self.num_timesteps, info)
-                csv.writer(self.file).writerow(row[name] for name in COLUMNS)
-                self.file.flush()
-                for name in ("crashed", "override_share", "cost"):
-                    self.logger.record_mean(f"episode/{name}", row[name])
-                self.logger.record_mean("episode/ego_at_fault", row["blame"] in ("ego", "both"))
+        n_envs, rewards, dones = self.training_env.num_envs, self.locals["rewards"], self.locals["dones"]
+        self.returns += rewards
+        self.lengths += 1
+        ended = [
+            episode_row(self.num_timesteps, n_envs, info)
+            for done, info in zip(dones, self.locals["infos"], strict=True)
+            if done
+        ]
+        self._write(ended)
+        self.returns[dones], self.lengths[dones] = 0.0, 0
+        at_fault = sum(row["blame"] in ("ego", "both") for row in ended)
+        self.logger.record_mean("decision/reward", float(np.mean(rewards)))
+        self.logger.record_mean("decision/crashes", sum(row["crashed"] for row in ended) / n_envs)
+        self.logger.record_mean("decision/crashes_ego_at_fault", at_fault / n_envs)
         self.progress(self.num_timesteps)
         return True
 
     def _on_training_end(self) -> None:
+        infos, n_envs = self.training_env.last_infos, self.training_env.num_envs  # type: ignore[attr-defined]
+        unfinished = np.flatnonzero(self.lengths).tolist()
+        self._write(
+            episode_row(
+                self.num_timesteps, n_envs, one(infos, e) | {"episode": {"r": self.returns[e], "l": self.lengths[e]}}, 1
+            )
+            for e in unfinished
+        )
         self.file.close()
 
+    def _write(self, rows: Iterable[dict[str, Any]]) -> None:
+        csv.writer(self.file).writerows([row[name] for name in COLUMNS] for row in rows)
+        self.file.flush()
 
-def episode_row(timesteps: int, info: dict[str, Any]) -> dict[str, Any]:
-    """The learning-curve row of an episode from the info of its last step."""
-    blame = info.get("blame", "")
+
+def episode_row(timesteps: int, n_envs: int, info: dict[str, Any], cut: int = 0) -> dict[str, Any]:
+    """The learning-curve row of an episode from the info of its last step, or of its latest if it is cut off."""
+    blame = str(info.get("blame", ""))
+    length = int(info["episode"]["l"])
     return {
         "timesteps": timesteps,
+        "started": timesteps - n_envs * length,
+        "cut": cut,
         "return": float(info["episode"]["r"]),
-        "length": int(info["episode"]["l"]),
+        "length": length,
         "crashed": int(bool(blame) or bool(info.get("crashed", False))),
-        "blame": blame,
+        "blame": blame or NO_CONTACT,
         "override_share": float(info.get("override_share", 0.0)),
         "cost": float(info.get("episode_cost", 0.0)),
     }

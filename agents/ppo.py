@@ -3,10 +3,11 @@
 Training proceeds in blocks of a few rollouts. A block starts by seeding every generator and resetting
 every environment from (seed, timesteps done), and ends by saving the model. So a block depends on
 the saved model alone, and a run that was killed and resumed gives the same result, bit for bit, as
-one that was left alone. The price: at the end of a block the unfinished episodes are dropped (PPO
-bootstraps their value, so the estimate stays sound).
+one that was left alone. The price: at the end of a block the unfinished episodes are cut off (PPO
+bootstraps their value, so the estimate stays sound; the learning curve says which were).
 """
 
+import inspect
 import math
 import os
 import shutil
@@ -76,9 +77,7 @@ def train(
             model = PPO.load(checkpoint, env=env, device=device)
         else:
             shutil.rmtree(folder / "tensorboard", ignore_errors=True)
-            batch_size = n_steps * n_envs // BATCHES
-            options = {"n_steps": n_steps, "batch_size": batch_size, **HYPERPARAMETERS}
-            model = PPO("MlpPolicy", env, seed=seed, device=device, **options)
+            model = PPO("MlpPolicy", env, seed=seed, device=device, **_options(n_envs, total_timesteps))
         truncate_curve(curve, model.num_timesteps)
         model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
         recorder = CurveRecorder(curve, progress)
@@ -114,6 +113,30 @@ def load_policy(path: Path) -> Callable[[np.ndarray], np.ndarray]:
             return logits(flat).argmax(dim=1).numpy()
 
     return act
+
+
+def hyperparameters(n_envs: int, total_timesteps: int) -> dict[str, Any]:
+    """Everything that a training depends on, besides seed, device and environment."""
+    signature = inspect.signature(PPO.__init__).parameters.values()
+    defaults = {p.name: p.default for p in signature if p.default is not p.empty and p.name not in _NO_HYPERPARAMETERS}
+    return {
+        "algorithm": "stable_baselines3.PPO",
+        "policy": "MlpPolicy",
+        **defaults,
+        **_options(n_envs, total_timesteps),
+        "learning_rate_schedule": "falls linearly to 0, from block to block",
+        "rollouts_per_block": ROLLOUTS_PER_BLOCK,
+        "timesteps": rounded_timesteps(n_envs, total_timesteps),
+    }
+
+
+_NO_HYPERPARAMETERS = ("seed", "device", "tensorboard_log", "verbose", "stats_window_size", "_init_setup_model")
+
+
+def _options(n_envs: int, total_timesteps: int) -> dict[str, Any]:
+    """What differs from the defaults of stable-baselines3."""
+    n_steps = rollout_steps(n_envs, total_timesteps)
+    return {"n_steps": n_steps, "batch_size": n_steps * n_envs // BATCHES, **HYPERPARAMETERS}
 
 
 def rollout_steps(n_envs: int, total_timesteps: int) -> int:

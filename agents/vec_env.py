@@ -46,7 +46,7 @@ class VectorEnvAdapter(VecEnv):
         nothing: dict = {}
         list_of_infos = [nothing] * self.num_envs
         for e in np.flatnonzero(ended).tolist():
-            info = _one(infos["final_info"], e)
+            info = one(infos["final_info"], e)
             info["terminal_observation"] = infos["final_obs"][e]
             info["TimeLimit.truncated"] = bool(truncated[e] and not terminated[e])
             list_of_infos[e] = info
@@ -69,10 +69,10 @@ class VectorEnvAdapter(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
 
-def _one(infos: dict, e: int) -> dict:
+def one(infos: dict, e: int) -> dict:
     """Infos of environment `e` out of dictionaries of arrays, without the "_name" marks."""
     return {
-        name: _one(values, e) if isinstance(values, dict) else values[e]
+        name: one(values, e) if isinstance(values, dict) else values[e]
         for name, values in infos.items()
         if not name.startswith("_")
     }

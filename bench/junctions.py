@@ -163,7 +163,7 @@ def is_in_way(engine: Any, e: int) -> bool:
 def contacts(frame: pd.DataFrame) -> list[str]:
     """Contacts, how many by each verdict, and what the others and the ego broke in them."""
     by_verdict = [int((frame["blame"] == verdict).sum()) for verdict in VERDICTS]
-    evidence = [json.loads(text) for text in frame["evidence"] if text]
+    evidence = [grounds for grounds in map(json.loads, frame["evidence"]) if grounds]
     broken = [counted([grounds[duty] for grounds in evidence]) for duty in ("other_duty", "ego_duty")]
     return [str(int(frame["crashed"].sum())), "/".join(map(str, by_verdict)), *broken]
 

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 
 @contextmanager
 def atomic(path: Path) -> Iterator[Path]:
@@ -37,6 +39,8 @@ def to_json(value: Any) -> str:
 def _strict(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(key): _strict(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _strict(value.tolist())
     if isinstance(value, list | tuple):
         return [_strict(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):

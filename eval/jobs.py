@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
+from eval.interrupt import children_ignore_interrupts
 from eval.progress import move_to, progress_bar
 
 _TICK = 0.2  # seconds between two looks at the news
@@ -25,14 +26,11 @@ class Job(NamedTuple):
     work: Callable[..., Any]  # called with `progress`, a function of the units done; picklable
 
 
-class Stopped(Exception):
-    """Raised in a worker whose parent was interrupted."""
-
-
 def run_jobs(jobs: Sequence[Job], n_workers: int) -> None:
     """Do all jobs, `n_workers` at a time (1: in this process).
 
-    Whatever a job raises is raised here; what the other jobs were doing is stopped.
+    Whatever a job raises is raised here, and so is KeyboardInterrupt; what the other jobs were doing is
+    stopped at once, wherever it is.
     """
     if n_workers == 1 or len(jobs) <= 1:
         for job in jobs:
@@ -44,20 +42,21 @@ def run_jobs(jobs: Sequence[Job], n_workers: int) -> None:
     context: Any = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     news, stop = context.Queue(), context.Event()
     bars: dict[int, tqdm] = {}
-    with ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (news, stop)) as pool:
-        try:
+    pool = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (news, stop))
+    try:
+        with children_ignore_interrupts():
             left = {pool.submit(_run_in_worker, i, job.work) for i, job in enumerate(jobs)}
-            while left:
-                finished, left = wait(left, _TICK, FIRST_COMPLETED)
-                _show(news, jobs, bars)
-                for done in finished:
-                    done.result()
+        while left:
+            finished, left = wait(left, _TICK, FIRST_COMPLETED)
             _show(news, jobs, bars)
-        finally:
-            stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            for bar in bars.values():
-                bar.close()
+            for done in finished:
+                done.result()
+        _show(news, jobs, bars)
+    finally:
+        stop.set()  # first of all: then nothing that is still to be waited for takes long
+        pool.shutdown(cancel_futures=True)
+        for bar in bars.values():
+            bar.close()
 
 
 def _show(news: Any, jobs: Sequence[Job], bars: dict[int, tqdm]) -> None:
@@ -74,27 +73,21 @@ def _show(news: Any, jobs: Sequence[Job], bars: dict[int, tqdm]) -> None:
             bars[i].close()
 
 
-_worker: dict[str, Any] = {}  # how a worker process reports, and hears that it must stop
+_worker: dict[str, Any] = {}  # how a worker process reports
 
 
 def _start_worker(news: Any, stop: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
-    threading.Thread(target=_exit_with_parent, daemon=True).start()
-    _worker["news"], _worker["stop"] = news, stop
+    for end in (multiprocessing.parent_process().join, stop.wait):  # type: ignore[union-attr]
+        threading.Thread(target=_exit_after, args=(end,), daemon=True).start()
+    _worker["news"] = news
 
 
-def _exit_with_parent() -> None:
-    """A worker whose parent was killed must not go on for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+def _exit_after(end: Callable[[], Any]) -> None:
+    """A worker must not go on for ever when its parent was killed, nor to the end of its job when it must stop."""
+    end()
+    os._exit(1)
 
 
 def _run_in_worker(i: int, work: Callable[..., Any]) -> None:
-    def progress(done: int) -> None:
-        _worker["news"].put((i, done))
-        if _worker["stop"].is_set():
-            raise Stopped
-
-    work(progress=progress)
+    work(progress=lambda done: _worker["news"].put((i, done)))

@@ -3,13 +3,14 @@
 A cell is a (train, test) pair: shield off or on while training, off or on while testing.
 """
 
+import math
 from collections.abc import Container
 from typing import Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from eval.stats import Interval, bootstrap_mean, bootstrap_median, paired_difference, wilson
+from eval.stats import Interval, bootstrap_mean, bootstrap_median, paired_difference, student, wilson
 
 BLAMES = ("ego", "both", "other", "inherited", "none")
 
@@ -23,22 +24,23 @@ class Metric(NamedTuple):
     statistic: Literal["rate", "mean", "median"]
     scale: float  # shown value = scale * value
     digits: int
+    limits: tuple[float, float] = (-math.inf, math.inf)  # what the value can be
 
 
 # The success rate and the time of the episodes that succeed belong to environments with a goal only.
 METRICS = (
-    Metric("crash", "crash", "%", "rate", 100, 0),
-    Metric("at_fault", "ego at fault", "%", "rate", 100, 0),
-    Metric("other", "other at fault", "%", "rate", 100, 0),
-    Metric("inherited", "inherited", "%", "rate", 100, 0),
-    Metric("none", "none", "%", "rate", 100, 0),
-    Metric("success", "success", "%", "rate", 100, 0),
-    Metric("time_to_goal", "time to goal", "s", "mean", 1, 1),
+    Metric("crash", "crash", "%", "rate", 100, 0, (0, 1)),
+    Metric("at_fault", "ego at fault", "%", "rate", 100, 0, (0, 1)),
+    Metric("other", "other at fault", "%", "rate", 100, 0, (0, 1)),
+    Metric("inherited", "inherited", "%", "rate", 100, 0, (0, 1)),
+    Metric("none", "none", "%", "rate", 100, 0, (0, 1)),
+    Metric("success", "success", "%", "rate", 100, 0, (0, 1)),
+    Metric("time_to_goal", "time to goal", "s", "mean", 1, 1, (0, math.inf)),
     Metric("return", "return", "", "mean", 1, 1),
     Metric("speed", "speed", "m/s", "mean", 1, 1),
-    Metric("length", "length", "steps", "mean", 1, 1),
-    Metric("override_share", "overridden", "%", "mean", 100, 0),
-    Metric("min_ttc", "min TTC", "s", "median", 1, 1),
+    Metric("length", "length", "steps", "mean", 1, 1, (0, math.inf)),
+    Metric("override_share", "overridden", "%", "mean", 100, 0, (0, 1)),
+    Metric("min_ttc", "min TTC", "s", "median", 1, 1, (0, math.inf)),
 )
 
 
@@ -66,23 +68,49 @@ def metrics_in(names: Container[str]) -> list[Metric]:
 
 
 def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Every metric of every cell with a 95 % interval and n, the episodes that have it.
+    """Every metric of every cell with two 95 % intervals: over test episodes, and over training seeds.
 
     Args:
-      episodes: one row per episode; columns of `eval.rollout.run_episode` and train, test.
+      episodes: one row per episode; columns of `eval.rollout.run_episode` and train, test, train_seed.
 
     Returns:
-      Columns train, test, metric, value, low, high, n; cells in order of appearance. The bootstrap
-      draws from a generator of its own, so the same episodes give the same intervals.
+      Columns train, test, metric, value, low, high, n, seed_low, seed_high, seeds; cells in order of
+      appearance. n, seeds: the episodes and the training seeds that have the metric; low, high: over
+      episodes; seed_low, seed_high: see `over_seeds`. The bootstrap draws from a generator of its own,
+      so the same episodes give the same intervals.
     """
     rng = np.random.default_rng(0)
     rows = []
     for (train, test), cell in with_outcomes(episodes).groupby(["train", "test"], sort=False):
         for metric in metrics_in(cell.columns):
-            sample = cell[metric.name].to_numpy(float)
-            interval = _statistic(metric, sample[~np.isnan(sample)], rng)
-            rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict()})
+            known = cell[["train_seed", metric.name]].astype(float).dropna()
+            interval = _statistic(metric, known[metric.name].to_numpy(), rng)
+            per_seed = known.groupby("train_seed")[metric.name]
+            values = per_seed.median() if metric.statistic == "median" else per_seed.mean()
+            seeds = over_seeds(values.to_numpy(), interval, metric.limits)
+            rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict(), **seeds})
     return pd.DataFrame(rows)
+
+
+def over_seeds(values: np.ndarray, over_episodes: Interval, limits: tuple[float, float]) -> dict[str, float]:
+    """What training with other seeds may give: Student's t interval of the seeds' values.
+
+    Never narrower than the interval over episodes: seeds that happen to agree, as in no crash at all,
+    know no more than their episodes do.
+
+    Args:
+      values: [S], the metric of each training seed.
+      over_episodes: of all episodes of these seeds.
+      limits: what the metric can be.
+
+    Returns:
+      seed_low, seed_high (NaN for fewer than two seeds), seeds: S.
+    """
+    spread = student(values)
+    if spread.n < 2:
+        return {"seed_low": np.nan, "seed_high": np.nan, "seeds": spread.n}
+    low, high = np.fmin(spread.low, over_episodes.low), np.fmax(spread.high, over_episodes.high)
+    return {"seed_low": float(max(low, limits[0])), "seed_high": float(min(high, limits[1])), "seeds": spread.n}
 
 
 def differences(episodes: pd.DataFrame) -> pd.DataFrame:
@@ -91,7 +119,7 @@ def differences(episodes: pd.DataFrame) -> pd.DataFrame:
     A pair counts where both of its episodes have the metric: times to the goal only where both reach it.
 
     Returns:
-      Columns train, test, metric, value, low, high, n.
+      Columns train, test, metric, value, low, high, n, seed_low, seed_high, seeds, as in `summarise`.
     """
     rng = np.random.default_rng(0)
     keys = ["train_seed", "seed"]
@@ -104,8 +132,10 @@ def differences(episodes: pd.DataFrame) -> pd.DataFrame:
             baseline = pairs[f"{metric.name}_baseline"].to_numpy(float)
             known = ~np.isnan(sample - baseline)
             interval = paired_difference(sample[known], baseline[known], rng)
-            rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict()})
-    return pd.DataFrame(rows, columns=["train", "test", "metric", *Interval._fields])
+            values = pd.Series(sample - baseline)[known].groupby(pairs["train_seed"][known]).mean()
+            seeds = over_seeds(values.to_numpy(), interval, (-math.inf, math.inf))
+            rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict(), **seeds})
+    return pd.DataFrame(rows, columns=["train", "test", "metric", *Interval._fields, "seed_low", "seed_high", "seeds"])
 
 
 def _statistic(metric: Metric, sample: np.ndarray, rng: np.random.Generator) -> Interval:

@@ -1,6 +1,6 @@
 """The two figures of a run: learning curves, and who was to blame. PNG and PDF, fit for a paper."""
 
-from itertools import pairwise
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from matplotlib.ticker import PercentFormatter
 
 from eval.files import atomic
 from eval.metrics import BLAMES
-from eval.stats import Interval, bootstrap_mean, wilson
+from eval.stats import Interval, completion_weights, weighted_mean, weighted_rate, wilson
 
 # Okabe & Ito's colours, told apart with every common colour blindness
 ARM_COLOURS = {"unshielded": "#D55E00", "shielded": "#0072B2"}
@@ -34,42 +34,52 @@ STYLE: Any = {
     "pdf.fonttype": 42,  # text stays text
     "savefig.dpi": 200,
 }
-BINS = 10  # points of a learning curve
+BINS = 10  # points of a learning curve, at most
+UNFINISHED = 0.05  # a point is drawn where at most this share of the episodes has an unknown end
 
 
 def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
     """Return, crashes, blame and overrides against timesteps, one line per arm with its 95 % band.
 
+    A point stands for all episodes that began in its bin, however long they lasted and whether or not
+    they were cut off (`completion_weights`). Bins are joined where too few of them could be finished.
+
     Args:
       curve: one row per training episode of all arms and seeds; columns arm, train_seed, timesteps,
-        return, crashed, blame, override_share.
+        started, cut, length, return, crashed, blame, override_share.
       folder: gets learning_curve.png and learning_curve.pdf.
     """
     at_fault = curve["blame"].isin(["ego", "both"])
     panels = (
-        ("Return per episode", curve["return"], "mean"),
-        ("Episodes with a crash", curve["crashed"], "rate"),
-        ("Episodes with the ego at fault", at_fault, "rate"),
-        ("Frames overridden by the shield", curve["override_share"], "share"),
+        ("Return per episode", curve["return"], weighted_mean),
+        ("Episodes with a crash", curve["crashed"], weighted_rate),
+        ("Episodes with the ego at fault", at_fault, weighted_rate),
+        ("Frames overridden by the shield", curve["override_share"], weighted_mean),
     )
     edges = np.linspace(0, max(curve["timesteps"].max(), 1) if len(curve) else 1, BINS + 1)
-    rng = np.random.default_rng(0)
+    bins = {arm: joined_bins(rows, edges) for arm, rows in curve.groupby("arm", sort=False)}
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.5, 4.6))
-        for axes, (name, values, kind) in zip(figure.subplots(2, 2, sharex=True).flat, panels, strict=True):
+        for axes, (name, values, statistic) in zip(figure.subplots(2, 2, sharex=True).flat, panels, strict=True):
             for arm, rows in curve.groupby("arm", sort=False):
                 label = f"{arm} (n = {len(rows)} episodes, {_seeds(rows['train_seed'].nunique())})"
-                points = _binned(rows["timesteps"], values[rows.index], edges, kind == "rate", rng)
+                points = [
+                    ((low + high) / 2, _point(statistic, values[inside.index], inside))
+                    for low, high, inside in bins[arm]
+                ]
                 _line(axes, points, label, ARM_COLOURS.get(str(arm), "#009E73"))
             axes.set_title(name, loc="left")
-            if kind != "mean":
+            if name != "Return per episode":
                 axes.yaxis.set_major_formatter(PercentFormatter(1.0))
                 axes.set_ylim(-0.03, 1.03)
             if axes.get_subplotspec().is_last_row():
                 axes.set_xlabel("Training timesteps [decisions]")
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
-        figure.suptitle(f"{title}: training (lines: means of {BINS} bins; bands: 95 % intervals)", size=9)
+        explained = (
+            "point: all episodes begun in its bin, those cut off weighted in; band: 95 % interval over these episodes"
+        )
+        figure.suptitle(f"{title}: training\n({explained})", size=8)
         _save(figure, folder / "learning_curve")
 
 
@@ -114,7 +124,7 @@ def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.set_ylim(bottom=0)
         figure.legend(title="Who broke their duty", loc="outside lower center", ncols=len(BLAMES))
-        whiskers = "whiskers: 95 % Wilson intervals; left: ego or both, right: all crashes"
+        whiskers = "whiskers: 95 % Wilson intervals over episodes; left: ego or both, right: all"
         figure.suptitle(f"{title}: who is to blame ({whiskers})", size=9)
         _save(figure, folder / "blame")
 
@@ -126,17 +136,42 @@ def _blamed(cell: pd.DataFrame, blame: str) -> pd.Series:
     return cell["blame"] == blame
 
 
-def _binned(
-    timesteps: pd.Series, values: pd.Series, edges: np.ndarray, rate: bool, rng: np.random.Generator
-) -> list[tuple[float, Interval]]:
-    """(bin centre, mean with interval) of every bin that holds an episode."""
-    points = []
-    for low, high in pairwise(edges):
-        inside = values[(timesteps > low) & (timesteps <= high)].to_numpy(float)
-        if inside.size:
-            interval = wilson(int(inside.sum()), inside.size) if rate else bootstrap_mean(inside, rng)
-            points.append(((low + high) / 2, interval))
-    return points
+def joined_bins(episodes: pd.DataFrame, edges: np.ndarray) -> list[tuple[float, float, pd.DataFrame]]:
+    """(from, to, its episodes with their weights) of every bin.
+
+    Args:
+      episodes: columns started, length, cut.
+      edges: [B + 1]; an episode is in the bin that it began in. A bin of which too much is unknown is joined
+        with the next one, the last one with that before.
+
+    Returns:
+      At most B bins; the episodes have a column weight.
+    """
+    bins: list[tuple[float, float, pd.DataFrame]] = []
+    begin = edges[0]
+    for end in edges[1:]:
+        inside = _weighted(episodes, begin, end)
+        if inside["weight"].sum() >= 1 - UNFINISHED:
+            bins.append((begin, end, inside))
+            begin = end
+    if begin < edges[-1] and len(_weighted(episodes, begin, edges[-1])):
+        begin = bins.pop()[0] if bins else begin
+        bins.append((begin, edges[-1], _weighted(episodes, begin, edges[-1])))
+    return bins
+
+
+def _weighted(episodes: pd.DataFrame, begin: float, end: float) -> pd.DataFrame:
+    inside = episodes[(episodes["started"] >= begin) & (episodes["started"] < end)]
+    return inside.assign(weight=completion_weights(inside["length"], inside["cut"]))
+
+
+def _point(statistic: Callable[..., Interval], values: pd.Series, inside: pd.DataFrame) -> Interval:
+    """No value where too much is unknown; the interval of a rate says how much."""
+    interval = statistic(values, inside["weight"])
+    if inside["weight"].sum() >= 1 - UNFINISHED:
+        return interval
+    known = interval if statistic is weighted_rate else Interval(np.nan, np.nan, np.nan, interval.n)
+    return known._replace(value=np.nan)
 
 
 def _line(axes: Axes, points: list[tuple[float, Interval]], label: str, colour: str) -> None:

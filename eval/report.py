@@ -15,6 +15,7 @@ from eval.files import atomic, write_json
 from eval.metrics import differences, summarise
 from eval.plots import plot_blame, plot_learning_curve
 from eval.replay import compare, verdict
+from eval.run_folder import changes
 from eval.table import print_table, write_table
 
 SHIELD = {"unshielded": "off", "shielded": "on"}  # arm -> shield while training
@@ -62,13 +63,26 @@ def write_report(folder: Path) -> None:
     )
     n_seeds = f"{len(seeds)} training seed" + ("s" if len(seeds) > 1 else "")
     title = (
-        f"PPO on {config['env_id']}, RSS preset {config['preset']}, {_conduct(config)}"
-        f"{config['total_timesteps']} timesteps per arm, {n_seeds}"
+        f"PPO on {config['env_id']}{_given('config', config['config'])}, RSS preset {config['preset']}"
+        f"{_given('ego', config['ego'])}{_given('other', config['other'])}, {_conduct(config)}"
+        f"{config['total_timesteps']} timesteps per arm, {_penalty(config)}, {n_seeds}"
     )
     write_table(summary, folder, title, note)
     plot_learning_curve(curve, folder, str(config["env_id"]))
     plot_blame(episodes, folder, str(config["env_id"]))
     print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160), note)
+
+
+def _given(option: str, values: dict[str, Any]) -> str:
+    """What replaces the defaults of an environment or a preset: " (config.lanes_count 4)"; empty if nothing does."""
+    named = [f"{option}.{name} {value}" for name, value, _ in changes(values, {})]
+    return f" ({', '.join(named)})" if named else ""
+
+
+def _penalty(config: dict[str, Any]) -> str:
+    """The training reward of the shielded arm is not that of the other one if there is a penalty."""
+    penalty = config["intervention_penalty"]
+    return f"intervention penalty {penalty:g} in training" if penalty else "no intervention penalty"
 
 
 def _conduct(config: dict[str, Any]) -> str:
@@ -96,8 +110,8 @@ def write_cell(path: Path, episodes: pd.DataFrame, arm: str, seed: int, test: st
 
 
 def read_cell(path: Path) -> pd.DataFrame:
-    """Read episodes as they were written: an empty text stays a text, a float keeps its last bit."""
-    return pd.read_csv(path, keep_default_na=False)
+    """Read episodes as they were written; a float keeps its last bit."""
+    return pd.read_csv(path, float_precision="round_trip")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+NO_CONTACT = "no contact"  # blame in tables: an empty text would come back from a CSV file as a missing value
 MakeEnv = Callable[[], Any]  # builds a gymnasium environment whose info has the shield's keys
 Policy = Callable[[Any], Any]  # observation -> action
 
@@ -79,10 +80,11 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
 
     seed; return; length [decisions]; speed: mean of info["speed"] [m/s]; crashed: the car touched
     somebody; env_crashed: the simulator's own flag; blame: ego, both, other, inherited, none or
-    empty; inherited: blame is "inherited"; time: how long the episode lasted [s]; success: the car has
+    NO_CONTACT; inherited: blame is "inherited"; time: how long the episode lasted [s]; success: the car has
     reached its goal untouched (no such column where there is no goal); cost: sum; override_share: of
     the simulation frames; dangerous_pairs, broken_duties: pair-frames in danger, and those on which the
-    car broke its duty; min_ttc: smallest time to collision [s]; evidence: the verdict's grounds as JSON.
+    car broke its duty; min_ttc: smallest time to collision [s]; evidence: the verdict's grounds as JSON,
+    {} without contact.
     """
     env = make_env()
     try:
@@ -114,14 +116,14 @@ def _record(seed: int, total_reward: float, total_speed: float, length: int, inf
         "speed": float(total_speed) / length,
         "crashed": crashed,
         "env_crashed": bool(info["crashed"]),
-        "blame": blame,
+        "blame": blame or NO_CONTACT,
         "inherited": blame == "inherited",
         "cost": float(info["episode_cost"]),
         "override_share": float(info["override_share"]),
         "dangerous_pairs": int(info["episode_dangerous_pairs"]),
         "broken_duties": int(info["episode_broken_duties"]),
         "min_ttc": float(info["min_ttc"]),
-        "evidence": json.dumps(info["blame_evidence"], default=_plain) if blame else "",
+        "evidence": json.dumps(info["blame_evidence"] if blame else {}, default=_plain),
     }
 
 

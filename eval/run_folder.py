@@ -1,5 +1,6 @@
 """The folder of a run: made once, gone on with only under the same configuration."""
 
+import hashlib
 import json
 import platform
 import shutil
@@ -8,12 +9,15 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
+
 from eval.files import to_json, write_json
 
 PACKAGES = (
     "rss-shield",
     "gymnasium",
     "highway-env",
+    "llvmlite",
     "matplotlib",
     "numba",
     "numpy",
@@ -28,7 +32,7 @@ def open_run(folder: Path, config: dict[str, Any], *, resume: bool, overwrite: b
     """Make the folder of a run, or check that the run in it may go on, and record its configuration.
 
     Args:
-      config: everything that the result depends on; strict JSON apart from tuples and infinities.
+      config: everything that the result depends on; strict JSON apart from tuples, infinities and arrays.
       resume: go on with the run in the folder, if there is one.
       overwrite: throw the run in the folder away, if there is one.
 
@@ -54,13 +58,12 @@ def open_run(folder: Path, config: dict[str, Any], *, resume: bool, overwrite: b
         return []
     before = json.loads(record.read_text(encoding="utf-8"))
     now = json.loads(to_json(provenance))
-    for field in now["config"] | before["config"]:
-        old, new = before["config"].get(field), now["config"].get(field)
-        if old != new:
-            raise ValueError(
-                f"{field} = {new!r}, but {folder} was started with {old!r}; "
-                "give the same value, or --overwrite, or another --name"
-            )
+    changed = changes(now["config"], before["config"])
+    if changed:
+        raise ValueError(
+            f"{'; '.join(f'{field} = {new!r}, but {folder} was started with {old!r}' for field, new, old in changed)}; "
+            "give the same value, or --overwrite, or another --name"
+        )
     return [
         f"{name} was {before.get(name)} when this run was started and is {now[name]} now"
         for name in now
@@ -68,14 +71,43 @@ def open_run(folder: Path, config: dict[str, Any], *, resume: bool, overwrite: b
     ]
 
 
+def recorded(folder: Path) -> dict[str, Any] | None:
+    """The configuration of the run in a folder; None if there is no run.
+
+    Raises:
+      ValueError: the record cannot be read.
+    """
+    record = folder / "config.json"
+    if not record.exists():
+        return None
+    try:
+        return json.loads(record.read_text(encoding="utf-8"))["config"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{record} cannot be read: {error!r}; --overwrite starts anew") from None
+
+
+def changes(now: Any, before: Any, name: str = "") -> list[tuple[str, Any, Any]]:
+    """(dotted name, now, before) of every value that differs; None where there is none."""
+    sides = (now, before)
+    if any(isinstance(side, dict) for side in sides) and all(isinstance(side, dict | None) for side in sides):
+        now, before = now or {}, before or {}
+        return [
+            change
+            for key in now | before
+            for change in changes(now.get(key), before.get(key), f"{name}.{key}" if name else key)
+        ]
+    return [] if now == before else [(name, now, before)]
+
+
 def versions() -> dict[str, Any]:
     """Versions of Python, of the packages that matter, and of this code."""
     return {
         "python": platform.python_version(),
         "platform": platform.platform(),
+        "cpu": llvmlite.binding.get_host_cpu_name(),  # what is compiled for it may round the last bit differently
         "packages": {name: _version(name) for name in PACKAGES},
         "git_commit": _git("rev-parse", "HEAD"),
-        "git_changes": bool(_git("status", "--porcelain", "--untracked-files=no")),
+        "git_changes": _digest(_git("diff", "HEAD")),
     }
 
 
@@ -84,6 +116,11 @@ def _version(package: str) -> str | None:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return None
+
+
+def _digest(changes: str | None) -> str | None:
+    """What tells one state of changed files from another; None if nothing is changed."""
+    return hashlib.sha256(changes.encode()).hexdigest()[:16] if changes else None
 
 
 def _git(*arguments: str) -> str | None:

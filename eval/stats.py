@@ -64,6 +64,74 @@ def paired_difference(
     return bootstrap_mean(sample - baseline, rng, confidence)
 
 
+def completion_weights(lengths: ArrayLike, cut: ArrayLike) -> np.ndarray:
+    """What each finished episode stands for when others were cut off before their end.
+
+    An episode that is cut off passes its weight on, in equal parts, to those that lasted longer
+    (Efron 1967); these are the steps of Kaplan and Meier's estimator (1958). Cutting off must not depend
+    on how an episode would have gone on.
+
+    Args:
+      lengths: [n], how long each was watched.
+      cut: [n], was it cut off?
+
+    Returns:
+      [n], 0 for those cut off. The sum is 1, less what episodes stand for that were cut off later than
+      any other ended.
+    """
+    lengths, cut = np.asarray(lengths, float), np.asarray(cut, bool)
+    if not lengths.size:
+        return np.zeros(0)
+    lasting = stats.ecdf(stats.CensoredData.right_censored(lengths, cut)).sf
+    steps = -np.diff(lasting.probabilities, prepend=1.0)
+    step = np.searchsorted(lasting.quantiles, lengths)
+    finished = np.bincount(step, weights=~cut, minlength=steps.size)
+    return np.where(cut, 0.0, steps[step] / np.maximum(finished[step], 1.0))
+
+
+def weighted_rate(sample: ArrayLike, weights: ArrayLike, confidence: float = 0.95) -> Interval:
+    """Rate of a weighted 0/1 sample [n] with Wilson's interval for as many equally weighted values as it is worth.
+
+    What the weights lack to 1 may be anything: the interval makes room for it.
+    """
+    sample, weights = np.asarray(sample, float), np.asarray(weights, float)
+    total = float(weights.sum())
+    if not total:
+        return Interval(np.nan, 0.0, 1.0, sample.size)
+    value = min(float(sample @ weights) / total, 1.0)
+    worth = round(total**2 / float(weights @ weights))  # Kish's effective size; n if all weigh the same
+    interval = wilson(round(value * worth), worth, confidence)
+    low, high = min(interval.low, value), max(interval.high, value)
+    return Interval(value, low * total, min(high * total + 1.0 - total, 1.0), sample.size)
+
+
+def weighted_mean(sample: ArrayLike, weights: ArrayLike, confidence: float = 0.95) -> Interval:
+    """Mean of a weighted sample [n] with the normal interval of its linearised variance."""
+    sample, weights = np.asarray(sample, float), np.asarray(weights, float)
+    total = float(weights.sum())
+    if not total:
+        return Interval(np.nan, np.nan, np.nan, sample.size)
+    value = float(sample @ weights) / total
+    if np.count_nonzero(weights) < 2:
+        return Interval(value, np.nan, np.nan, sample.size)
+    error = float(np.sqrt(weights**2 @ (sample - value) ** 2)) / total
+    low, high = value + error * np.array(stats.norm.interval(confidence))
+    return Interval(value, float(low), float(high), sample.size)
+
+
+def student(sample: ArrayLike, confidence: float = 0.95) -> Interval:
+    """Mean with Student's t interval, for the few values that training seeds give. sample: [n]."""
+    sample = np.asarray(sample, float)
+    n = sample.size
+    if n < 2:
+        return Interval(float(sample.mean()) if n else np.nan, np.nan, np.nan, n)
+    mean = float(sample.mean())
+    if np.ptp(sample) == 0:
+        return Interval(mean, mean, mean, n)
+    bounds = stats.ttest_1samp(sample, 0.0).confidence_interval(confidence)
+    return Interval(mean, float(bounds.low), float(bounds.high), n)
+
+
 def _bootstrap(sample: np.ndarray, statistic, method: str, rng: np.random.Generator, confidence: float) -> Interval:
     n = sample.size
     if n == 0:

@@ -1,11 +1,13 @@
 """The comparison as one table: in the terminal, as plain text, Markdown, LaTeX and CSV."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from eval.files import atomic, write_text
@@ -14,24 +16,27 @@ from eval.metrics import metrics_in
 LEGEND = (
     "train, test: shield off or on. crash (% of the n test episodes) = ego at fault + other at fault + inherited (the "
     "episode began in that danger) + none (unexplained: a bug). overridden: % of simulation frames. length: decisions. "
-    "min TTC: smallest time to collision, median of the episodes. [low, high]: 95 % interval over test episodes (rates "
-    "Wilson, others bootstrap); other training seeds may differ by more."
+    "min TTC: smallest time to collision, median of the episodes. [low, high]: 95 % interval over test episodes of "
+    "these trained models (rates Wilson, others bootstrap). (low, high): the same over training seeds, so what other "
+    "seeds may give (Student's t of the seeds' values, at least as wide as the first; – for a single seed)."
 )
+MOST_DIGITS = 9  # what is closer to a limit is at the limit
 GOAL_LEGEND = (
     " success: % of the n test episodes that reached the goal without a contact; time to goal: mean of those episodes."
 )
 
 
 def table_frame(summary: pd.DataFrame) -> pd.DataFrame:
-    """One row per cell, texts only: train, test, n and a "value [low, high]" per metric."""
+    """One row per cell, texts only: train, test, n and a "value [low, high] (seed_low, seed_high)" per metric."""
     rows = []
     for (train, test), cell in summary.groupby(["train", "test"], sort=False):
         cell = cell.set_index("metric")
         row = {"train": train, "test": test, "n": str(cell["n"].iloc[0])}
         for metric in metrics_in(cell.index):
             heading = f"{metric.label} [{metric.unit}]" if metric.unit else metric.label
-            value, low, high = cell.loc[metric.name, ["value", "low", "high"]].to_numpy(float) * metric.scale
-            row[heading] = with_interval(value, low, high, metric.digits)
+            numbers = cell.loc[metric.name, ["value", "low", "high", "seed_low", "seed_high"]].to_numpy(float)
+            limits = tuple(metric.scale * limit for limit in metric.limits)
+            row[heading] = with_intervals(numbers * metric.scale, metric.digits, limits)
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -41,13 +46,23 @@ def legend(summary: pd.DataFrame) -> str:
     return LEGEND + GOAL_LEGEND * ("success" in set(summary["metric"]))
 
 
-def with_interval(value: float, low: float, high: float, digits: int) -> str:
-    """ "3.1 [2.8, 3.4]"; a dash for what is unknown."""
-    if np.isnan(value):
+def with_intervals(numbers: np.ndarray, digits: int, limits: tuple[float, ...] = ()) -> str:
+    """Value, interval over episodes, interval over seeds: "3.1 [2.8, 3.4] (1.9, 4.3)"; a dash for what is unknown."""
+    value, low, high, seed_low, seed_high = (rounded(number, digits, limits) for number in numbers)
+    if value == "–":
+        return value
+    over_episodes = "[–]" if "–" in (low, high) else f"[{low}, {high}]"
+    over_seeds = "(–)" if "–" in (seed_low, seed_high) else f"({seed_low}, {seed_high})"
+    return f"{value} {over_episodes} {over_seeds}"
+
+
+def rounded(number: float, digits: int, limits: tuple[float, ...] = ()) -> str:
+    """At least `digits` decimals, and so many that it does not look like zero or a limit that it is only close to."""
+    if np.isnan(number):
         return "–"
-    if np.isnan(low) or np.isnan(high):
-        return f"{value:.{digits}f} [–]"
-    return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
+    away = min(abs(number - limit) for limit in (0.0, *limits))
+    needed = math.ceil(-math.log10(away)) if 10.0**-MOST_DIGITS < away < 1 else 0
+    return f"{number:z.{max(digits, needed)}f}"
 
 
 def write_table(summary: pd.DataFrame, folder: Path, title: str, note: str = "") -> None:
@@ -81,8 +96,8 @@ def print_table(summary: pd.DataFrame, title: str, console: Console, note: str =
 
 
 def _rich(frame: pd.DataFrame, title: str) -> Table:
-    """Headings and intervals break at the bracket only, so a column is as narrow as its interval."""
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    """Headings and intervals break at the brackets only, so a column is as narrow as its widest interval."""
+    table = Table(title=escape(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for i, heading in enumerate(frame.columns):
         table.add_column(_broken(heading), justify="left" if i == 0 else "right", no_wrap=True)
     for row in frame.itertuples(index=False):
@@ -91,7 +106,7 @@ def _rich(frame: pd.DataFrame, title: str) -> Table:
 
 
 def _broken(text: str) -> str:
-    return text.replace(" [", "\n\\[")
+    return text.replace(" [", "\n\\[").replace(" (", "\n(")
 
 
 def _markdown(frame: pd.DataFrame) -> str:

@@ -11,7 +11,7 @@ MAY_IMPORT = {
     "shield": {"numpy", "numba"},
     "envs": {"shield", "gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo"},
     "agents": {"gymnasium", "stable_baselines3", "torch", "numpy"},
-    "eval": {"numpy", "scipy", "pandas", "matplotlib", "rich", "tqdm"},
+    "eval": {"numpy", "scipy", "pandas", "matplotlib", "rich", "tqdm", "llvmlite", "yaml"},
 }
 MODULES = [path for package in MAY_IMPORT for path in sorted((ROOT / package).rglob("*.py"))]
 

@@ -19,7 +19,7 @@ def episodes_of(blames: list[str], train: str = "off", test: str = "off", crashe
             "train_seed": 0,
             "train": train,
             "test": test,
-            "blame": blames,
+            "blame": [blame or "no contact" for blame in blames],
             "crashed": [bool(b) for b in blames] if crashed is None else crashed,
             "return": np.arange(n, dtype=float),
             "speed": 25.0,
@@ -107,6 +107,67 @@ def test_differences_are_paired_by_seed_whatever_the_order_of_rows():
     assert result.loc["return", ["value", "low", "high"]].tolist() == [2.0, 2.0, 2.0]
     assert result.loc["crash", "value"] == -1.0
     assert result.loc["crash", "n"] == 6
+
+
+def of_seeds(*returns: list[float], blames=None) -> pd.DataFrame:
+    """Training seeds 0, 1, ... with the returns of their test episodes."""
+    return pd.concat(
+        [
+            episodes_of(blames or [""] * len(values)).assign(**{"train_seed": seed, "return": values})
+            for seed, values in enumerate(returns)
+        ],
+        ignore_index=True,
+    )
+
+
+def test_the_interval_over_seeds_is_students_of_the_seeds_means():
+    summary = summarise(of_seeds([9.0, 11.0] * 50, [19.0, 21.0] * 50, [29.0, 31.0] * 50)).set_index("metric")
+    # means 10, 20, 30: s = 10, t of 2 degrees of freedom is 4.303: 20 +- 4.303 * 10 / sqrt(3)
+    assert summary.loc["return", ["seed_low", "seed_high", "seeds"]].tolist() == pytest.approx(
+        [-4.84, 44.84, 3], abs=0.01
+    )
+    assert summary.loc["return", "high"] < 22
+
+
+@pytest.mark.parametrize("seeds", [2, 3, 5])
+def test_seeds_that_agree_know_no_more_than_their_episodes(seeds):
+    summary = summarise(of_seeds(*[[1.0, 2.0, 3.0, 4.0]] * seeds)).set_index("metric")
+    for metric in ("crash", "at_fault", "return"):
+        row = summary.loc[metric]
+        assert (row["seed_low"], row["seed_high"]) == (row["low"], row["high"])
+        assert row["seed_high"] > 0
+
+
+@pytest.mark.parametrize("crashes", [1, 2, 4])
+def test_an_interval_of_a_rate_stays_a_rate(crashes):
+    blames = ["ego"] * crashes + [""] * (5 - crashes)
+    episodes = pd.concat([of_seeds([0.0] * 5, blames=blames), of_seeds([0.0] * 5).assign(train_seed=1)])
+    row = summarise(episodes).set_index("metric").loc["crash"]
+    assert 0 <= row["seed_low"] <= row["low"] <= row["value"] <= row["high"] <= row["seed_high"] <= 1
+
+
+def test_the_interval_over_seeds_covers_what_training_gives_on_average():
+    rng, covered = np.random.default_rng(5), 0
+    for _ in range(60):
+        means = rng.normal(20, 3, 4)
+        row = summarise(of_seeds(*rng.normal(means[:, None], 2, (4, 25)).tolist())).set_index("metric").loc["return"]
+        covered += row["seed_low"] <= 20 <= row["seed_high"]
+    assert covered >= 53
+
+
+def test_one_seed_says_nothing_about_others():
+    row = summarise(of_seeds([1.0, 2.0])).set_index("metric").loc["return"]
+    assert np.isnan(row["seed_low"])
+    assert np.isnan(row["seed_high"])
+    assert row["seeds"] == 1
+
+
+def test_differences_have_an_interval_over_seeds_too():
+    baseline = of_seeds([1.0, 2.0], [1.0, 2.0], [1.0, 2.0])
+    changed = of_seeds([2.0, 3.0], [3.0, 4.0], [4.0, 5.0]).assign(test="on")
+    row = differences(pd.concat([baseline, changed])).set_index("metric").loc["return"]
+    # 1, 2, 3: s = 1; 2 +- 4.303 / sqrt(3)
+    assert row[["seed_low", "seed_high", "seeds"]].tolist() == pytest.approx([-0.484, 4.484, 3], abs=1e-3)
 
 
 def test_one_cell_alone_has_no_differences():

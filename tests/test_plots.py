@@ -16,9 +16,12 @@ def a_curve(n: int) -> pd.DataFrame:
             "arm": ["unshielded", "shielded"] * n,
             "train_seed": 0,
             "timesteps": np.repeat(np.arange(n) * 10 + 5, 2),
+            "started": np.repeat(np.arange(n) * 10, 2),
+            "length": 5,
+            "cut": rng.integers(0, 4, 2 * n) == 0,
             "return": rng.normal(10, 2, 2 * n),
             "crashed": rng.integers(0, 2, 2 * n),
-            "blame": rng.choice(["", "ego", "other"], 2 * n),
+            "blame": rng.choice(["no contact", "ego", "other"], 2 * n),
             "override_share": rng.random(2 * n),
         }
     )

@@ -57,7 +57,7 @@ def test_training_leaves_a_model_a_curve_and_tensorboard_events(uninterrupted):
     rows = rows_of(uninterrupted)
     assert len(rows) > 20
     assert tuple(rows[0]) == COLUMNS
-    assert all(int(row["crashed"]) == (row["blame"] != "") for row in rows)
+    assert all(int(row["crashed"]) == (row["blame"] != "no contact") for row in rows)
     assert list((uninterrupted / "tensorboard").iterdir())
     assert not (uninterrupted / "checkpoint.zip").exists()
 
@@ -130,9 +130,9 @@ def test_a_loaded_policy_does_not_depend_on_the_size_of_the_batch(uninterrupted)
 
 def test_a_row_cut_short_by_a_kill_is_dropped(tmp_path):
     path = tmp_path / "curve.csv"
-    path.write_text(",".join(COLUMNS) + "\n10,1.0,5,0,,0.0,0.0\n30,1.0,5,0,,0.0,0.0\n1")
+    path.write_text(",".join(COLUMNS) + "\n10,0,0,1.0,5,0,ego,0.0,0.0\n30,0,1,1.0,5,0,ego,0.0,0.0\n1")
     truncate_curve(path, 20)
-    assert path.read_text().split() == [",".join(COLUMNS), "10,1.0,5,0,,0.0,0.0"]
+    assert path.read_text().split() == [",".join(COLUMNS), "10,0,0,1.0,5,0,ego,0.0,0.0"]
 
 
 @pytest.mark.parametrize("n_envs", [1, 2, 3, 5, 6, 16, 100])

@@ -42,9 +42,9 @@ def test_a_contact_that_the_simulator_does_not_flag_is_a_crash():
 
 def test_an_episode_without_a_crash_runs_to_its_end():
     record = run_episode(FakeEnv, brake, seed=6)
-    assert (record["length"], record["crashed"], record["blame"]) == (10, False, "")
+    assert (record["length"], record["crashed"], record["blame"]) == (10, False, "no contact")
     assert record["override_share"] == 1.0
-    assert record["evidence"] == ""
+    assert json.loads(record["evidence"]) == {}
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,11 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from eval.files import atomic, to_json, write_json
-from eval.run_folder import open_run
+from eval.run_folder import open_run, recorded
 
 CONFIG = {"env_id": "a-road", "seeds": (0, 1), "cap": float("inf")}
 
@@ -33,6 +34,23 @@ def test_a_different_configuration_is_refused_naming_the_field(tmp_path):
     open_run(tmp_path, CONFIG, resume=False, overwrite=False)
     with pytest.raises(ValueError, match=r"seeds = \[0\], but .* was started with \[0, 1\]"):
         open_run(tmp_path, CONFIG | {"seeds": (0,)}, resume=True, overwrite=False)
+
+
+def test_every_difference_is_named_however_deep(tmp_path):
+    nested = CONFIG | {"ppo": {"gamma": 0.9, "net": {"pi": [64]}}}
+    open_run(tmp_path, nested, resume=False, overwrite=False)
+    other = CONFIG | {"ppo": {"gamma": 0.99, "net": {"pi": [64, 64]}}}
+    with pytest.raises(ValueError, match=r"ppo\.gamma = 0\.99, but .*0\.9; ppo\.net\.pi = \[64, 64\], but .*\[64\]"):
+        open_run(tmp_path, other, resume=True, overwrite=False)
+
+
+def test_the_configuration_of_a_run_is_read_back(tmp_path):
+    assert recorded(tmp_path / "nothing") is None
+    open_run(tmp_path, CONFIG | {"table": np.array([1.0, 2.0])}, resume=False, overwrite=False)
+    assert recorded(tmp_path) == {"env_id": "a-road", "seeds": [0, 1], "cap": "inf", "table": [1.0, 2.0]}
+    (tmp_path / "config.json").write_text("{")
+    with pytest.raises(ValueError, match=r"config\.json cannot be read"):
+        recorded(tmp_path)
 
 
 def test_changed_packages_are_reported_when_a_run_goes_on(tmp_path):

@@ -22,6 +22,16 @@ TINY = ["--total-timesteps", "64", "--seeds", "0", "--eval-episodes", "3", "--re
 CELLS = [("off", "off"), ("off", "on"), ("on", "off"), ("on", "on")]
 
 
+@pytest.fixture(autouse=True)
+def interrupts_as_before():
+    """The script takes Ctrl-C and uncaught errors over."""
+    handler, hook = signal.getsignal(signal.SIGINT), sys.excepthook
+    yield
+    signal.set_wakeup_fd(-1)
+    signal.signal(signal.SIGINT, handler)
+    sys.excepthook = hook
+
+
 def call(monkeypatch, *arguments: str) -> None:
     """Run the script in this process."""
     monkeypatch.setattr(sys, "argv", ["train.py", *arguments])
@@ -71,13 +81,32 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--other.a-min-brake 7", "--other: a_min_brake = 7 is out of range: expected at most a_max_brake = 6"),
         ("--ego.response-time 0.01", "response_time = 0.01 s of the ego is shorter than one simulation frame"),
         ("--no-such-option", "--no-such-option"),
+        ("--name aux", "--name aux is out of range: expected letters, digits and . , = + - _, such as _aux"),
+        ("--name a:b", "--name a:b is out of range: expected letters, digits and . , = + - _, such as a-b"),
+        (
+            "--config.lane-count 4",
+            "config.lane_count is not known to highway-fast-v0; the nearest is config.lanes_count",
+        ),
+        ("--config.lanes-count four", "config.lanes_count = 'four': expected a whole number >= 1"),
+        ("--config.lanes-count 0", "config.lanes_count = 0: expected a whole number >= 1"),
+        ("--config.vehicles-density 0", "config.vehicles_density = 0: not possible in highway-fast-v0: Zero"),
+        ("--config.initial-lane-id 9", "config.initial_lane_id = 9: not possible in highway-fast-v0: IndexError"),
+        (
+            "--config.observation.vehicle-count 8",
+            "config.observation.vehicle_count is not known; the nearest is config.observation.vehicles_count",
+        ),
+        ("--config.action.type ContinuousAction", "config.action = {'type': 'ContinuousAction'}: not possible in"),
+        ("--config.duration.seconds 3", "--config.duration.seconds: config.duration = 30 has no keys of its own"),
+        ("--config.lanes-count", "--config.lanes-count: expected a key and a value"),
+        ("--config nowhere.json", "--config: nowhere.json: [Errno 2] No such file or directory"),
+        ("--config [1]", "--config: [1]: expected a file .json, .toml, .yaml or .yml, or JSON itself"),
     ],
 )
 def test_bad_input_ends_in_one_line_and_exit_code_2(arguments, message, monkeypatch, capsys, tmp_path):
     with pytest.raises(SystemExit) as stop:
         call(monkeypatch, *arguments.split(), "--runs-dir", str(tmp_path))
     printed = capsys.readouterr().err.strip().splitlines()
-    lines = [line for line in printed if "Warning" not in line]
+    lines = [line for line in printed if "Warning" not in line and not line.startswith("compiling")]
     assert stop.value.code == 2
     assert len(lines) == 1
     assert lines[0].startswith("train.py: error: ")
@@ -104,6 +133,11 @@ def test_the_folder_is_named_after_the_options_that_are_not_defaults():
     assert script["run_name"](config(runs_dir=Path("elsewhere"), resume=True)) == "highway-fast-v0"
     chosen = config(env_id="merge-v0", seeds=(1, 2), ego=overrides(response_time=0.5))
     assert script["run_name"](chosen) == "merge-v0,seeds=1-2,ego.response_time=0.5"
+    configured = config(
+        config={"lanes_count": 4, "reward_speed_range": [20, 30], "observation": {"type": "Kinematics"}}
+    )
+    name = "highway-fast-v0,config.lanes_count=4,config.reward_speed_range=20-30,config.observation.type=Kinematics"
+    assert script["run_name"](configured) == name
     crossing = config(env_id="intersection-v0", entry="priority", intent="known", waiting="anywhere")
     assert script["run_name"](crossing) == "intersection-v0,entry=priority,intent=known,waiting=anywhere"
 
@@ -178,6 +212,11 @@ def test_a_run_writes_everything_a_paper_needs(finished):
     assert not config["config"]["parameters"]["roads_cross"]
     assert config["config"]["parameters"]["ego"]["a_max_brake"] == 6.0
     assert config["packages"]["torch"]
+    ppo = config["config"]["ppo"]
+    assert (ppo["gamma"], ppo["gae_lambda"], ppo["n_epochs"], ppo["clip_range"]) == (0.9, 0.95, 10, 0.2)
+    assert ppo["n_steps"] * 2 == ppo["batch_size"] * 8
+    assert config["config"]["environment"]["lanes_count"] == 3
+    assert config["config"]["test_seeds"] == {"first": 10**9, "last": 10**9 + 2}
     for name in ("blame", "learning_curve"):
         with Image.open(folder / f"{name}.png") as image:
             image.load()
@@ -185,7 +224,7 @@ def test_a_run_writes_everything_a_paper_needs(finished):
 
 def test_every_cell_of_a_run_plays_the_same_seeds(finished):
     folder, _ = finished
-    episodes = pd.read_csv(folder / "episodes.csv", keep_default_na=False)
+    episodes = pd.read_csv(folder / "episodes.csv")
     seeds = {cell: list(rows["seed"]) for cell, rows in episodes.groupby(["train", "test"], sort=False)}
     assert list(seeds) == CELLS
     assert list(seeds.values()) == [[10**9, 10**9 + 1, 10**9 + 2]] * 4
@@ -209,7 +248,7 @@ def test_an_episode_tampered_with_is_named_in_the_report(finished, tmp_path):
     folder = shutil.copytree(finished[0], tmp_path / "tampered")
     path = folder / "episodes" / "shielded-seed0-test-on.csv"
     episode = pd.read_csv(folder / "replays" / path.name)["seed"].item()
-    episodes = pd.read_csv(path, keep_default_na=False)
+    episodes = pd.read_csv(path)
     episodes.loc[episodes["seed"] == episode, "length"] += 1
     episodes.to_csv(path, index=False)
     report = [sys.executable, "-m", "eval.report", str(folder)]
@@ -224,7 +263,7 @@ def test_the_original_simulator_is_one_flag_away(tmp_path):
     output, _ = process.communicate(timeout=300)
     assert process.returncode == 0, output
     assert "Replayed" not in output
-    episodes = pd.read_csv(tmp_path / "original" / "episodes.csv", keep_default_na=False)
+    episodes = pd.read_csv(tmp_path / "original" / "episodes.csv")
     assert list(zip(episodes["train"], episodes["test"], strict=True)) == CELLS
     assert not (tmp_path / "original" / "replays").exists()
 
@@ -233,7 +272,9 @@ def test_a_run_at_a_junction_says_who_got_across_and_how_the_ego_behaved(tmp_pat
     process = start(tmp_path, "--env-id", "intersection-v0", "--intent", "known", "--name", "junction")
     output, _ = process.communicate(timeout=600)
     assert process.returncode == 0, output
-    title = "RSS preset intersection, cautious entry, known intent, waiting at the line, 64 timesteps per arm"
+    title = (
+        "RSS preset intersection, cautious entry, known intent, waiting at the line, 64 timesteps per arm, no interv"
+    )
     assert title in " ".join(output.split())
     assert "4 of 4 test episodes agree" in " ".join(output.split())
     table = (tmp_path / "junction" / "table.md").read_text()
@@ -264,6 +305,127 @@ def test_a_run_killed_thrice_and_resumed_gives_the_same_episodes(finished, tmp_p
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
 
 
+def test_a_run_with_a_configuration_trains_tests_and_replays_with_it(tmp_path):
+    (tmp_path / "road.json").write_text('{"lanes_count": 2, "vehicles_count": 8, "duration": 6}')
+    options = [
+        "--config",
+        str(tmp_path / "road.json"),
+        "--config.lanes-count",
+        "4",
+        "--config.observation.vehicles-count=9",
+    ]
+    process = start(tmp_path, *options, "--name", "wide", "--intervention-penalty", "0.25")
+    output, _ = process.communicate(timeout=300)
+    assert process.returncode == 0, output
+    assert "4 of 4 test episodes agree" in " ".join(output.split())
+    folder = tmp_path / "wide"
+    config = json.loads((folder / "config.json").read_text())["config"]
+    assert config["config"] == {
+        "lanes_count": 4,
+        "vehicles_count": 8,
+        "duration": 6,
+        "observation": {"type": "Kinematics", "vehicles_count": 9},
+    }
+    assert [config["environment"][key] for key in ("lanes_count", "duration", "policy_frequency")] == [4, 6, 1]
+    assert pd.read_csv(folder / "episodes.csv")["length"].max() == 6
+    assert pd.read_csv(folder / "unshielded-seed0" / "learning_curve.csv")["length"].max() <= 6
+    title = (folder / "table.md").read_text().splitlines()[0]
+    for part in (
+        "config.lanes_count 4",
+        "config.observation.vehicles_count 9",
+        "intervention penalty 0.25 in training",
+    ):
+        assert part in title
+    again, _ = start(tmp_path, "--name", "wide", "--resume").communicate(timeout=300)
+    assert f"Everything is in {folder}" in again
+
+
+def test_the_original_simulator_takes_the_same_configuration(tmp_path):
+    options = (
+        "--backend highway-env --total-timesteps 16 --eval-episodes 1 --name few --config.duration 4 --arms shielded"
+    )
+    process = start(tmp_path, *options.split(), "--config", '{"vehicles_count": 5}')
+    output, _ = process.communicate(timeout=300)
+    assert process.returncode == 0, output
+    assert pd.read_csv(tmp_path / "few" / "episodes.csv")["length"].max() <= 4
+
+
+MILESTONES = {
+    "while it imports": lambda folder: True,
+    "while it is set up": lambda folder: (folder.parent / "a moment later").exists(),
+    "when workers start": lambda folder: (folder / "config.json").exists(),
+    "in training": lambda folder: len(list(folder.glob("*/learning_curve.csv"))) == 2,
+    "in testing": lambda folder: len(list(folder.glob("*/model.zip"))) == 2,
+}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("milestone", MILESTONES)
+def test_two_interrupts_at_once_end_a_run_within_seconds_and_it_can_be_resumed(milestone, workers, tmp_path):
+    runs, folder = tmp_path / "runs", tmp_path / "runs" / "stopped"
+    small = ["--name", "stopped", "--resume", "--workers", str(workers), "--runs-dir", str(runs)]
+    options = ["--total-timesteps", "200000" if milestone == "in training" else "64", "--eval-episodes"]
+    options += ["100000" if milestone == "in testing" else "3"]
+    command = [sys.executable, str(SCRIPT), *TINY, *small, *options]
+    process = subprocess.Popen(
+        command, cwd=SCRIPT.parent, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
+    )
+    time.sleep(1.5)  # the interpreter itself has started
+    if milestone == "while it is set up":
+        time.sleep(4)
+        (runs / "a moment later").mkdir(parents=True)
+    while not MILESTONES[milestone](folder):
+        assert process.poll() is None, process.stdout.read()
+        time.sleep(0.02)
+    began = time.perf_counter()
+    for _ in range(2):
+        os.killpg(process.pid, signal.SIGINT)
+    process.wait(timeout=60)
+    assert time.perf_counter() - began < 10
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, output
+    assert output.count("train.py: stopping; nothing that is finished is lost") == 1
+    assert "Traceback" not in output
+    assert "leaked" not in output
+    if milestone == "in testing":
+        finished = {path: path.stat().st_mtime_ns for path in folder.glob("*/model.zip")}
+        record = json.loads((folder / "config.json").read_text())
+        record["config"] |= {"eval_episodes": 3, "test_seeds": {"first": 10**9, "last": 10**9 + 2}}
+        (folder / "config.json").write_text(json.dumps(record))
+        again, _ = start(runs, "--name", "stopped", "--resume").communicate(timeout=300)
+        assert f"Everything is in {folder}" in again
+        assert {path: path.stat().st_mtime_ns for path in finished} == finished
+
+
+def test_to_resume_nothing_is_said(tmp_path, monkeypatch, capsys):
+    with pytest.raises(SystemExit):
+        call(monkeypatch, "--resume", "--name", "never", "--runs-dir", str(tmp_path), "--config.lanes-count", "0")
+    call(monkeypatch, *TINY, "--arms", "shielded", "--resume", "--name", "new", "--runs-dir", str(tmp_path))
+    assert f"nothing to resume in {tmp_path / 'new'}: a new run is started there" in capsys.readouterr().err
+
+
+NAMED = [
+    ("highway_env:highway-v0", "highway_env-highway-v0"),
+    ('a/b\\c*d?e"f<g>h|i', "a-b-c-d-e-f-g-h-i"),
+    ("..hidden..", "hidden"),
+    ("NUL", "_NUL"),
+    ("com1.old", "_com1.old"),
+    ("merge-v0,seeds=1-2", "merge-v0,seeds=1-2"),
+]
+
+
+@pytest.mark.parametrize(("text", "name"), NAMED)
+def test_a_name_is_one_that_every_system_takes(text, name):
+    assert runpy.run_path(str(SCRIPT))["valid_name"](text) == name
+
+
+def test_long_names_are_shortened_and_stay_different():
+    valid_name = runpy.run_path(str(SCRIPT))["valid_name"]
+    long = [valid_name("road," + ",".join(f"option{i}={i + last}" for i in range(40))) for last in range(3)]
+    assert len(set(long)) == 3
+    assert all(len(name) == 120 for name in long)
+
+
 def test_a_taken_folder_is_refused(finished, monkeypatch, capsys):
     folder, _ = finished
     with pytest.raises(SystemExit) as stop:
@@ -272,20 +434,35 @@ def test_a_taken_folder_is_refused(finished, monkeypatch, capsys):
     assert "exists; --resume goes on with it, --overwrite starts it anew" in capsys.readouterr().err
 
 
-def test_resuming_with_another_configuration_is_refused_naming_the_field(finished, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("options", "contradiction"),
+    [
+        ("--preset slides", "--preset slides contradicts simulator"),
+        ("--seeds 0 1", "--seeds 0 1 contradicts 0"),
+        ("--ego.mu 0.3", "--ego.mu 0.3 contradicts (not given)"),
+        ("--config.lanes-count 4", "--config.lanes-count 4 contradicts (not given)"),
+        ("--n-envs 3 --intent known", "--intent known contradicts any, --n-envs 3 contradicts 2"),
+        ("--intervention-penalty 0.5", "--intervention-penalty 0.5 contradicts 0.0"),
+    ],
+)
+def test_resuming_with_other_options_is_refused_naming_them(options, contradiction, finished, monkeypatch, capsys):
     folder, _ = finished
-    options = [*TINY, "--runs-dir", str(folder.parent), "--name", "whole", "--resume", "--preset", "slides"]
     with pytest.raises(SystemExit) as stop:
-        call(monkeypatch, *options)
+        call(monkeypatch, "--runs-dir", str(folder.parent), "--name", "whole", "--resume", *options.split())
     assert stop.value.code == 2
-    assert "preset = 'slides', but" in capsys.readouterr().err
+    printed = capsys.readouterr().err
+    assert f"{contradiction}, with which the run in {folder} was started" in printed
+    assert len([line for line in printed.splitlines() if "Warning" not in line and line.strip()]) == 1
 
 
-def test_resuming_a_finished_run_repeats_only_the_report(finished, monkeypatch, capsys):
+@pytest.mark.parametrize("options", [" ".join(TINY), "", "--seeds 0", "--preset auto --n-envs 2 --workers 1"])
+def test_resuming_a_finished_run_with_its_options_or_none_repeats_only_the_report(
+    options, finished, monkeypatch, capsys
+):
     folder, _ = finished
     before = (folder / "table.csv").read_bytes()
     began = time.perf_counter()
-    call(monkeypatch, *TINY, "--runs-dir", str(folder.parent), "--name", "whole", "--resume")
+    call(monkeypatch, *options.split(), "--runs-dir", str(folder.parent), "--name", "whole", "--resume")
     assert time.perf_counter() - began < 20
     assert "95 % interval" in " ".join(capsys.readouterr().out.split())
     assert (folder / "table.csv").read_bytes() == before
