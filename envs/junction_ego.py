@@ -60,6 +60,7 @@ class JunctionEgo(ShieldedEgo):
         self.frames_trapped = 0
         self.pairs_examined = self.pairs_possible = 0  # pair-frames: plans were checked against somebody, could be
         self.may_pass: bool | None = None  # the light ahead
+        self.judging = False  # a contact: who had crashed is read off the frame before
 
     def _frame(self) -> None:
         vehicle, settings = self.vehicle, self.settings
@@ -151,6 +152,8 @@ class JunctionEgo(ShieldedEgo):
             heads_for, route = self._declared(v)
             if heads_for is not None:
                 car["lane"], car["choice"] = junction.number[heads_for], junction.choice(heads_for, route)
+        if self.judging:  # a contact flags both cars at once
+            cars["wreck"][:-1] = self.crossings["wreck"]
         roads, settings = junction.roads, self.settings
         track = track_of(roads, cars[-1], self.path)
         self.path = track.path
@@ -223,7 +226,9 @@ class JunctionEgo(ShieldedEgo):
         super()._follow(others)
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:
+        self.judging = True
         _, threats, roads = self._look()
+        self.judging = False
         other, dt = self.settings.other, self.settings.dt
         outside = [is_outside(roads.paths, threats, i, self.cars[i]) for i in touching]
         return [
