@@ -70,7 +70,7 @@ CROSSING = np.dtype(
         ("since", "i8"),  # frames since the last sample with a plan; 0 = there is one now
         ("items", "i8"),  # plans at that sample: STOP, GO or both; 0 = never any
         ("follows", "?"),  # was the ego's follower at the last sample, on one of its ways at least
-        ("behind", "?"),  # on all of them, and has been so at a safe distance
+        ("behind", "?"),  # and has been so at a safe distance
         ("relied", "?"),  # is counted on to give way on this frame
         ("relied_before", "?"),  # was so on the frame before
         ("way", "i8"),  # path of the ego then
@@ -182,7 +182,7 @@ def has_plan(scene, memory, entry, at_line):
     """
     _find_those_behind(scene, memory)
     for i in range(len(memory)):
-        follows, gap_is_safe = _is_behind(scene, i)
+        _, follows, gap_is_safe = _is_behind(scene, i)
         if follows and not (gap_is_safe or memory[i].behind):
             return False
     sort_out(scene, memory, entry)
@@ -353,16 +353,10 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     """
     _judge_motion(sample, memory, scene.other, scene.dt)
     scene = _alone_with(scene, i)
-    follows, gap_is_safe = _is_behind(scene, i)
-    dangerous, kept, items, cut_in, too_hard, followed = False, True, STOP, False, False, False
-    if follows:
-        memory.behind |= gap_is_safe
-        items = STOP if memory.behind else 0
-        too_hard = a < -scene.ego.a_max_brake - _TOLERANCE
-        if too_hard and not gap_is_safe:
-            dangerous, kept = True, False
-    else:
-        followed, memory.behind = memory.behind, False
+    may_follow, follows, gap_is_safe = _is_behind(scene, i)
+    dangerous, kept, items, cut_in = False, True, STOP, False
+    followed, memory.behind = memory.behind, may_follow and (memory.behind or gap_is_safe)
+    if not follows:
         strongest = max(limit(scene.ego.a_max_accel, scene.track.v, scene.ego, scene.dt), a)
         if stop_conflict(scene, strongest, i, ANYWHERE, 0.0) != NEVER:
             dangerous = True
@@ -370,15 +364,21 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
                 items, kept = _plans_and_duty(scene, i, a)
         had_plan = memory.age > 0 and memory.since == 0 and not followed
         cut_in = items == 0 and had_plan and memory.way != scene.track.path and memory.other_broke == KEPT
+    if may_follow and not memory.behind:
+        items = 0
+    too_hard = may_follow and a < -scene.ego.a_max_brake - _TOLERANCE
+    if too_hard and not gap_is_safe:
+        dangerous, kept = True, False
     if items != 0:
         memory.items, memory.since = items, 0
         memory.other_broke, memory.other_excess = KEPT, 0.0
-        if gap_is_safe or not follows:  # braking too hard in front of a follower matters until it has its distance again
+        # having braked too hard in front of a follower counts until that has its distance again
+        if memory.ego_broke != TOO_HARD or gap_is_safe or not may_follow:
             memory.ego_broke, memory.ego_excess = KEPT, 0.0
     else:
         memory.since += 1
-        if followed and memory.other_broke == KEPT:  # their ways part, and it had not kept its distance
-            memory.other_broke = TOO_FAR
+        if followed and not may_follow and memory.other_broke == KEPT:
+            memory.other_broke = TOO_FAR  # their ways part, and it had not kept its distance
     if cut_in:
         kept = False
         memory.ego_broke = CUT_IN
@@ -387,7 +387,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
         memory.ego_excess = abs(a)
     if trapped and not kept and not cut_in:
         kept = _is_resolute(scene, a)
-    memory.follows, memory.way = _may_be_follower(scene), scene.track.path
+    memory.follows, memory.way = may_follow, scene.track.path
     memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
     memory.reachable = sample.reachable
     memory.wreck, memory.astray = sample.wreck, sample.astray
@@ -433,26 +433,16 @@ def _judge_motion(sample, memory, other, dt):
 
 @inner
 def _is_behind(scene, i):
-    """Does a road user follow the ego, whatever way it takes, and at a safe distance (Lemma 2)?"""
-    behind, safe = False, True
+    """Does a road user follow the ego on any of its ways, on all of them, and at a safe distance on those (Lemma 2)?"""
+    some, every, safe = False, True, True
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if threat.user != i:
             continue
-        if not threat.follows:
-            return False, False
-        behind = True
-        safe = safe and _keeps_distance(scene, threat)
-    return behind, safe
-
-
-@inner
-def _may_be_follower(scene):
-    """Is a road user that is alone in the scene a follower on one of its ways?"""
-    found = False
-    for k in range(len(scene.threats)):
-        found |= scene.threats[k].follows
-    return found
+        some |= threat.follows
+        every &= threat.follows
+        safe = safe and (not threat.follows or _keeps_distance(scene, threat))
+    return some, some and every, safe
 
 
 @inner
@@ -537,7 +527,7 @@ def _ttc(scene):
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if threat.path >= 0 and threat.v < track.v:
-            s = on_path_of_ego(scene.paths, track.path, track.s, threat, threat.s)
+            s = on_path_of_ego(scene.paths, track, track.s, threat, threat.s)
             gap = s - track.s - track.half_length - threat.half_length
             if track.s <= s < np.inf:
                 ttc = min(ttc, max(gap, 0.0) / (track.v - threat.v))

@@ -54,9 +54,15 @@ class Watch(NamedTuple):
     max_slip: float  # that the ego can steer [rad]
 
 
-def compile_ways(network, net: Network) -> Ways:
-    """The paths through the junctions of a `highway_env.road.road.RoadNetwork`; `net`: the same as arrays."""
-    junction = junction_of(network)
+def compile_ways(network, net: Network, dt: float) -> Ways:
+    """The paths through the junctions of a `highway_env.road.road.RoadNetwork`.
+
+    Args:
+      network: the road network.
+      net: the same as arrays.
+      dt: length of a frame [s].
+    """
+    junction = junction_of(network, dt=dt)
     return Ways(junction.roads, _choices(junction, network, net))
 
 
@@ -324,7 +330,7 @@ def _describe(car, choice, out):
         car.width,
     )
     out.wreck = car.crashed or car.kind == OBSTACLE
-    out.on, out.lane, out.choice = car.lane, -1, -1
+    out.size, out.on, out.lane, out.choice = 0, car.lane, -1, -1  # all are of one size
     if car.kind == TRAFFIC or car.kind == META:
         out.lane, out.choice = car.target_lane, choice[car.route + 1, car.target_lane]
 
