@@ -12,7 +12,20 @@ import numpy as np
 
 from envs.fast.network import LANE, compile_network, heading_at, is_far, local_coordinates
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH
-from envs.paths import STOCK, Size, beside, join, lay_out, lead_of, meet, successors_of, sweep, walks, widened
+from envs.paths import (
+    MARGIN_LON,
+    STOCK,
+    Size,
+    beside,
+    join,
+    lay_out,
+    lead_of,
+    meet,
+    successors_of,
+    sweep,
+    walks,
+    widened,
+)
 from shield.compiled import compiled
 from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y, cell_of, reach_beyond, reaches_into
 from shield.geometry import wrap_angle
@@ -36,6 +49,7 @@ _MOST_LANES = 63  # sets of lanes are bits
 # A car that is longer than stock ones turns with a larger slip: it may be off its lane by this much more
 # per metre, and turned by this angle more, but never as if it drove across.
 _OFF_LONGER, _TURNED_LONGER, _ACROSS = 0.5, 0.1, 1.4  # [m], [rad], [rad]
+_CREEPS = 0.5  # who is slower may stay where it is [m/s]
 _ROLL = 1.05  # a wreck rolls to rest in this time at its speed [s]
 
 # One road user in the world, as a simulator says.
@@ -336,12 +350,18 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
                         count = _add(roads, track, lane, row, i, car, v_cap, threats, count)
         samples[i].next_lanes = _joined(samples[i].lanes, roads.following)
         samples[i].reachable = _joined(samples[i].next_lanes, roads.beside)
-        if count == before:
-            samples[i].astray = not car.wreck
+        samples[i].astray = count == before and not car.wreck
+        if count == before or _stands_out(roads.paths, threats[before:count], i, car):
             if count < len(threats):
                 _add_obstacle(roads, track, i, car, threats[count], box)
             count += 1
     return count
+
+
+@compiled
+def _stands_out(paths, ways, i, car):
+    """Does a car stand, or nearly, where it reaches beyond what cars sweep on every way? Then it may stay like that."""
+    return abs(car.speed) < _CREEPS and is_outside(paths, ways, i, car)
 
 
 @compiled
@@ -416,12 +436,15 @@ def is_outside(paths, threats, i, car):
 
 @compiled
 def _add_obstacle(roads, track, i, car, threat, box):
-    """A wreck, or a car that is on no lane: it stays, or goes on straight to rest."""
+    """A wreck, or a car that is on no lane: it stays, or goes on straight to rest. Who is no wreck may turn, too."""
     roll = max(car.speed, 0.0) * _ROLL
+    length, turning = car.length, np.hypot(car.length, car.width)
+    if not car.wreck and turning - length > 2.0 * MARGIN_LON:  # more than the ego's margin has room for
+        length = turning
     cos, sin = np.cos(car.heading), np.sin(car.heading)
     box[X], box[Y] = car.x + 0.5 * roll * cos, car.y + 0.5 * roll * sin
     box[COS], box[SIN] = cos, sin
-    box[HALF_LENGTH], box[HALF_WIDTH] = 0.5 * (car.length + roll), 0.5 * car.width
+    box[HALF_LENGTH], box[HALF_WIDTH] = 0.5 * (length + roll), 0.5 * car.width
     threat.user, threat.path, threat.s, threat.v = i, -1, 0.0, max(car.speed, 0.0)
     threat.half_length, threat.wreck, threat.cap, threat.priority = 0.5 * car.length, True, 0.0, 0
     block(roads.paths, track, box, threat)
