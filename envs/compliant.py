@@ -76,7 +76,8 @@ class TurnTaker(JunctionEgo):
         lane = paths.lane[threat["path"], cell_of(threat["s"], paths.cells[threat["path"]])]
         if not np.isnan(paths.offset[track.path, lane]):
             return True
-        its_track = Track(threat["path"], threat["s"], threat["v"], threat["half_length"], -1, 0.0)
+        path = threat["path"] % len(paths.boxes)  # of the ego's size, as which it is the front here
+        its_track = Track(path, threat["s"], threat["v"], threat["half_length"], -1, 0.0)
         return self._is_behind(paths, track, its_track)
 
     def _is_behind(self, paths, track: Track, front: Track) -> bool:

@@ -16,7 +16,7 @@ from envs.bicycle import HEADING, LATERAL_SPEED, SPEED, YAW_RATE, lane_keeping, 
 from envs.fast.network import is_after_end, local_coordinates
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH
 from envs.highway import Settings
-from envs.junction_ego import JunctionEgo, junction_of
+from envs.junction_ego import JunctionEgo
 from envs.paths import MARGIN_LAT, MARGIN_LON
 from shield.blame import KEPT, LEFT_PATHS
 from shield.compiled import compiled
@@ -40,12 +40,18 @@ class FreeEgo(JunctionEgo):
       destination: name of the node where the ego goes; the way there is its route.
 
     Raises:
-      ValueError: no way leads there.
+      ValueError: no way leads there, or the car is none of highway-env's size.
     """
 
+    clearance = ROOM
+
     def __init__(self, vehicle: Any, settings: Settings, record: bool, destination: str) -> None:
+        if (vehicle.LENGTH, vehicle.WIDTH) != (CAR_LENGTH, CAR_WIDTH):
+            raise ValueError(
+                f"vehicle of {vehicle.LENGTH:g} m x {vehicle.WIDTH:g} m: expected {CAR_LENGTH:g} m x {CAR_WIDTH:g} m, "
+                "because the way of a car that is steered freely is played ahead for that size only"
+            )
         super().__init__(vehicle, settings, record)
-        self.junction = junction_of(vehicle.road.network, ROOM)
         self.route = declared_route(self.junction.walks, vehicle.lane_index, destination)
         self.passed = 0  # lanes of the route that lie behind
         self.dynamical = isinstance(vehicle, BicycleVehicle)

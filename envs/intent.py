@@ -5,12 +5,27 @@ straight  everybody is expected to go straight on; wrong whenever somebody turns
 any       every path that fits where a car is; the worst counts
 """
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
 
 from envs.fast.network import LANE, compile_network, heading_at, is_far, local_coordinates
-from envs.paths import beside, compile_paths, lead_of, successors_of, walks
+from envs.fast.state import CAR_LENGTH, CAR_WIDTH
+from envs.paths import (
+    MARGIN_LON,
+    STOCK,
+    Size,
+    beside,
+    join,
+    lay_out,
+    lead_of,
+    meet,
+    successors_of,
+    sweep,
+    walks,
+    widened,
+)
 from shield.compiled import compiled
 from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y, cell_of, reach_beyond, reaches_into
 from shield.geometry import wrap_angle
@@ -26,8 +41,15 @@ _BETWEEN = 1.0  # further from the middle of the lane it heads for, a car is on 
 # [m]. highway-env's drivers need at most `_SLANT` [m] along the lane for 1 m across when they are slow, and come nearer
 # by a factor of e in `_DECAY` [s] when they are fast; to turn the wheels and to straighten up takes them `_TURN_TIME`
 # [s] and `_TURN_LENGTH` [m].
+# A wider car has to come nearer to it, at most to within `_ALMOST` [m], and a longer one goes further meanwhile.
+_ALMOST = 0.2
 _CLEAR, _DECAY, _TURN_TIME, _SLANT, _TURN_LENGTH = 1.5, 0.6, 0.4, 2.0, 3.0
 _ANY_LANE = -1  # all bits
+_MOST_LANES = 63  # sets of lanes are bits
+# A car that is longer than stock ones turns with a larger slip: it may be off its lane by this much more
+# per metre, and turned by this angle more, but never as if it drove across.
+_OFF_LONGER, _TURNED_LONGER, _ACROSS = 0.5, 0.1, 1.4  # [m], [rad], [rad]
+_CREEPS = 0.5  # who is slower may stay where it is [m/s]
 _ROLL = 1.05  # a wreck rolls to rest in this time at its speed [s]
 
 # One road user in the world, as a simulator says.
@@ -39,6 +61,7 @@ CAR_ON_ROAD = np.dtype(
         ("speed", "f8"),
         ("length", "f8"),
         ("width", "f8"),
+        ("size", "i8"),  # index into `Junction.sizes`
         ("on", "i8"),  # lane it is on
         ("lane", "i8"),  # lane it heads for, -1 = nobody knows
         ("choice", "i8"),  # row of `Roads.choices`: paths of its route, -1 = nobody knows
@@ -49,7 +72,7 @@ CAR_ON_ROAD = np.dtype(
 
 
 class Roads(NamedTuple):
-    """A road network as junction code needs it. L lanes, R rows of choices."""
+    """A road network as junction code needs it. L lanes, R rows of choices, P paths of each size of cars."""
 
     paths: Paths
     lanes: np.ndarray  # `[L]` LANE
@@ -60,7 +83,7 @@ class Roads(NamedTuple):
     lead: np.ndarray  # `[L]` how far before its start cars come to a lane [m]
     following: np.ndarray  # `[L]` each lane and those that follow, as sets of bits
     beside: np.ndarray  # `[L]` each lane and those beside it, likewise
-    alongside: np.ndarray  # `[P, L]` path through each lane that goes on as much as possible like each path
+    alongside: np.ndarray  # `[Q, L]` path through each lane that goes on as much as possible like each path
 
 
 def no_roads() -> Roads:
@@ -99,11 +122,17 @@ class Junction:
     Args:
       network: the road network.
       room: the ego may be this much further to either side than highway-env's drivers [m].
+      dt: length of a frame, in which drivers steer [s].
+      sizes: of the cars there may be, that of the ego first.
+
+    Raises:
+      ValueError: too many lanes, or one that leads nowhere.
     """
 
-    def __init__(self, network, room: float = 0.0) -> None:
+    def __init__(self, network, room: float = 0.0, dt: float = 1 / 15, sizes: tuple[Size, ...] = (STOCK,)) -> None:
         self.number = {index: i for i, index in enumerate(network.lanes_dict())}
         self.walks = walks(network)
+        self._check()
         self._rows: list[list[int]] = []
         self._row_of: dict[tuple, int] = {}
         through = [self._row(self._distinct(index)) for index in self.number]
@@ -113,9 +142,37 @@ class Junction:
         self.lead, self.following, self.beside = lead_of(network), successors_of(network), beside(network)
         self.limit = float(lanes["speed_limit"].max())
         self.lanes = lanes
-        alongside = [[self._most_alike(walk, index) for index in self.number] for walk in self.walks]
-        self._arrays = (compile_paths(network, self.limit, room), np.array(through), np.array(straight))
-        self.alongside = np.array(alongside)
+        self._layout, self._dt = lay_out(network), dt
+        own = sweep(self._layout, self.limit, dt, sizes[0])
+        self._ego, self._swept = widened(own, room), []
+        self._choices = np.array(through), np.array(straight)
+        self._alongside = np.array([[self._most_alike(walk, index) for index in self.number] for walk in self.walks])
+        self._take_in(sizes)
+
+    def _check(self) -> None:
+        if len(self.number) > _MOST_LANES:
+            raise ValueError(
+                f"road network with {len(self.number)} lanes: expected at most {_MOST_LANES} where roads cross "
+                "(at roundabout-generic-v0: roundabout_lanes <= 5)"
+            )
+        for index in self.number:
+            if not any(index in walk for walk in self.walks):
+                raise ValueError(f"lane {index} of the road network: expected one that leads to an end of the network")
+
+    def with_size(self, size: Size) -> "Junction":
+        """The same junction for cars of one more size."""
+        more = copy(self)
+        more._swept = list(self._swept)
+        more._take_in((*self.sizes, size))
+        return more
+
+    def _take_in(self, sizes: tuple[Size, ...]) -> None:
+        for size in sizes[len(self._swept) :]:
+            self._swept.append(meet(self._layout, self._ego, sweep(self._layout, self.limit, self._dt, size)))
+        self.sizes = sizes
+        self._paths = join(self._layout, self._ego, self._swept)
+        count = len(self.walks)
+        self.alongside = np.concatenate([self._alongside + k * count for k in range(len(sizes))])
 
     def __deepcopy__(self, memo) -> "Junction":
         return self  # what is added later are answers to questions
@@ -123,7 +180,7 @@ class Junction:
     @property
     def roads(self) -> Roads:
         """Everything as arrays; rows for routes that were asked about are included."""
-        paths, through, straight = self._arrays
+        paths, (through, straight) = self._paths, self._choices
         choices = np.full((len(self._rows), max(map(len, self._rows))), -1)
         for row, numbers in enumerate(self._rows):
             choices[row, : len(numbers)] = numbers
@@ -240,9 +297,11 @@ def track_of(roads, car, path):
         return Track(path, s, car.speed, 0.5 * car.length, -1, 0.0, 0.0, 0.0)
     beside = roads.alongside[path, left]
     shift = _along(roads, beside, left, car) - s
-    to_clear = max(abs(lateral), _CLEAR)
-    after = _DECAY * np.log(to_clear / _CLEAR) + _TURN_TIME
-    at = s + _SLANT * (to_clear - _CLEAR) + _TURN_LENGTH
+    clear = max(_CLEAR - 0.5 * max(car.width - CAR_WIDTH, 0.0), _ALMOST)
+    longer = max(car.length / CAR_LENGTH, 1.0)
+    to_clear = max(abs(lateral), clear)
+    after = _DECAY * np.log(to_clear / clear) + _TURN_TIME
+    at = s + longer * (_SLANT * (to_clear - clear) + _TURN_LENGTH)
     return Track(path, s, car.speed, 0.5 * car.length, beside, shift, after, at)
 
 
@@ -277,7 +336,7 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
                     count = _add(roads, track, car.lane, car.choice, i, car, v_cap, threats, count)
                     samples[i].lanes = 1 << car.lane
                 s, lateral = local_coordinates(roads.lanes[car.lane], car.x, car.y)
-                path = roads.choices[car.choice, 0]
+                path = roads.choices[car.choice, 0] + car.size * len(roads.paths.boxes)
                 left = _lane_left(roads, car, path, s + roads.paths.offset[path, car.lane], lateral)
                 if left >= 0:
                     count = _add(roads, track, left, roads.through[left], i, car, v_cap, threats, count)
@@ -291,12 +350,18 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
                         count = _add(roads, track, lane, row, i, car, v_cap, threats, count)
         samples[i].next_lanes = _joined(samples[i].lanes, roads.following)
         samples[i].reachable = _joined(samples[i].next_lanes, roads.beside)
-        if count == before:
-            samples[i].astray = not car.wreck
+        samples[i].astray = count == before and not car.wreck
+        if count == before or _stands_out(roads.paths, threats[before:count], i, car):
             if count < len(threats):
                 _add_obstacle(roads, track, i, car, threats[count], box)
             count += 1
     return count
+
+
+@compiled
+def _stands_out(paths, ways, i, car):
+    """Does a car stand, or nearly, where it reaches beyond what cars sweep on every way? Then it may stay like that."""
+    return abs(car.speed) < _CREEPS and is_outside(paths, ways, i, car)
 
 
 @compiled
@@ -324,6 +389,9 @@ def _joined(lanes, sets):
 @compiled
 def _fits(lane, car, before, off, turned):
     """May a car be driving on a lane?"""
+    longer = max(car.length - CAR_LENGTH, 0.0)
+    off += _OFF_LONGER * longer
+    turned = min(turned + _TURNED_LONGER * longer, max(turned, _ACROSS))
     if is_far(lane, car.x, car.y, off, max(before, _BEYOND)):
         return False
     s, lateral = local_coordinates(lane, car.x, car.y)
@@ -339,6 +407,7 @@ def _add(roads, track, lane, row, i, car, v_cap, threats, count):
         path = roads.choices[row, m]
         if path < 0:
             break
+        path += car.size * len(roads.paths.boxes)
         if count < len(threats):
             threat = threats[count]
             threat.user, threat.path = i, path
@@ -367,12 +436,15 @@ def is_outside(paths, threats, i, car):
 
 @compiled
 def _add_obstacle(roads, track, i, car, threat, box):
-    """A wreck, or a car that is on no lane: it stays, or goes on straight to rest."""
+    """A wreck, or a car that is on no lane: it stays, or goes on straight to rest. Who is no wreck may turn, too."""
     roll = max(car.speed, 0.0) * _ROLL
+    length, turning = car.length, np.hypot(car.length, car.width)
+    if not car.wreck and turning - length > 2.0 * MARGIN_LON:  # more than the ego's margin has room for
+        length = turning
     cos, sin = np.cos(car.heading), np.sin(car.heading)
     box[X], box[Y] = car.x + 0.5 * roll * cos, car.y + 0.5 * roll * sin
     box[COS], box[SIN] = cos, sin
-    box[HALF_LENGTH], box[HALF_WIDTH] = 0.5 * (car.length + roll), 0.5 * car.width
+    box[HALF_LENGTH], box[HALF_WIDTH] = 0.5 * (length + roll), 0.5 * car.width
     threat.user, threat.path, threat.s, threat.v = i, -1, 0.0, max(car.speed, 0.0)
     threat.half_length, threat.wreck, threat.cap, threat.priority = 0.5 * car.length, True, 0.0, 0
     block(roads.paths, track, box, threat)

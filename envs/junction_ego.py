@@ -5,6 +5,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.highway import Frame, Settings, ShieldedEgo
 from envs.intent import CAR_ON_ROAD, Junction, is_outside, list_threats, track_of
+from envs.paths import STOCK, Size, size_of
 from envs.signalised import SignalisedRoad
 from shield.blame import Verdict
 from shield.command import Command
@@ -27,39 +28,47 @@ PLAN_NAMES = {0: "inherited", STOP: "stop", GO: "go", STOP | GO: "both"}
 _junctions: dict[tuple, Junction] = {}
 
 
-def junction_of(network, room: float = 0.0) -> Junction:
+def junction_of(network, room: float = 0.0, dt: float = 1 / 15, sizes: tuple[Size, ...] = (STOCK,)) -> Junction:
     """Paths of a road network; the same roads are never measured twice in a process.
 
     Args:
-      network: the road network.
-      room: the ego may be this much further to either side than highway-env's drivers [m].
+      network, room, dt, sizes: see `Junction`.
     """
     lanes = [network.get_lane(index) for index in network.lanes_dict()]
     ends = [tuple(lane.position(s, 0.0).round(3)) for lane in lanes for s in (0.0, lane.length)]
-    key = (room, *network.lanes_dict(), *ends, *((lane.priority, lane.speed_limit) for lane in lanes))
+    key = (room, dt, sizes, *network.lanes_dict(), *ends, *((lane.priority, lane.speed_limit) for lane in lanes))
     if key not in _junctions:
-        _junctions[key] = Junction(network, room)
+        # one size more is added to what is there
+        fewer = junction_of(network, room, dt, sizes[:-1]) if len(sizes) > 1 else None
+        _junctions[key] = fewer.with_size(sizes[-1]) if fewer else Junction(network, room, dt, sizes)
     return _junctions[key]
 
 
 class JunctionEgo(ShieldedEgo):
     """`ShieldedEgo` with plans through junctions instead of distances along the lane."""
 
+    clearance = 0.0  # the ego may be this much further to either side than highway-env's drivers [m]
+
     def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
         super().__init__(vehicle, settings, record)
-        self.junction = junction_of(vehicle.road.network)
+        self._measure((size_of(vehicle.LENGTH, vehicle.WIDTH),))
         self.crossings = np.zeros(0, CROSSING)
         self.samples = np.zeros(0, SAMPLE)
         self.cars = np.zeros(0, CAR_ON_ROAD)  # everybody on this sample, the ego last
         self.plan = np.zeros(1, PLAN)[0]
         self.plan["go"] = -1
         self.room = np.zeros(64, THREAT)
+        self.size_numbers: list[int] = []  # `[N]` index into the junction's sizes
         self.box = np.zeros(6)
         self.path = -1
         self.refused = False  # the lane change of this decision
         self.frames_trapped = 0
         self.pairs_examined = self.pairs_possible = 0  # pair-frames: plans were checked against somebody, could be
         self.may_pass: bool | None = None  # the light ahead
+        self.judging = False  # a contact: who had crashed is read off the frame before
+
+    def _measure(self, sizes: tuple[Size, ...]) -> None:
+        self.junction = junction_of(self.vehicle.road.network, self.clearance, self.settings.dt, sizes)
 
     def _frame(self) -> None:
         vehicle, settings = self.vehicle, self.settings
@@ -142,15 +151,17 @@ class JunctionEgo(ShieldedEgo):
         """The ego's track, the ways of all others, and the roads."""
         vehicle, junction = self.vehicle, self.junction
         cars = self.cars = np.zeros(len(self.others) + 1, CAR_ON_ROAD)
-        for car, v in zip(cars, [*self.others, vehicle], strict=True):
+        for car, v, size in zip(cars, [*self.others, vehicle], [*self.size_numbers, 0], strict=True):
             car["x"], car["y"] = v.position
             car["heading"], car["speed"], car["length"], car["width"] = v.heading, v.speed, v.LENGTH, v.WIDTH
             car["wreck"] = v.crashed or not hasattr(v, "action")
-            car["on"] = junction.number[v.lane_index]
+            car["size"], car["on"] = size, junction.number[v.lane_index]
             car["lane"] = car["choice"] = -1
             heads_for, route = self._declared(v)
             if heads_for is not None:
                 car["lane"], car["choice"] = junction.number[heads_for], junction.choice(heads_for, route)
+        if self.judging:  # a contact flags both cars at once
+            cars["wreck"][:-1] = self.crossings["wreck"]
         roads, settings = junction.roads, self.settings
         track = track_of(roads, cars[-1], self.path)
         self.path = track.path
@@ -221,9 +232,18 @@ class JunctionEgo(ShieldedEgo):
                 crossings[i] = self.crossings[old[id(other)]]
         self.crossings = crossings
         super()._follow(others)
+        # what never drives takes no path
+        own = self.junction.sizes[0]
+        sizes = [size_of(v.LENGTH, v.WIDTH) if hasattr(v, "action") else own for v in others]
+        new = [size for size in dict.fromkeys(sizes) if size not in self.junction.sizes]
+        if new:
+            self._measure((*self.junction.sizes, *new))
+        self.size_numbers = [self.junction.sizes.index(size) for size in sizes]
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:
+        self.judging = True
         _, threats, roads = self._look()
+        self.judging = False
         other, dt = self.settings.other, self.settings.dt
         outside = [is_outside(roads.paths, threats, i, self.cars[i]) for i in touching]
         return [

@@ -7,6 +7,7 @@ the conflict areas are made of the boxes that these cars cover.
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,10 +19,31 @@ from shield.conflict_areas import CELL, FAR, HALF_LENGTH, HALF_WIDTH, Paths, fin
 
 MARGIN_LON, MARGIN_LAT = 0.25, 0.15  # of each of two cars, beyond the tracked boxes [m]
 _SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the top speed, at which a path is driven
-_TRACK_DT = 1 / 15  # [s]
+_TRACK_DT = 1 / 15  # where frames are longer, a path is driven from several places as far apart as in this time [s]
 _JOIN = 3.9  # a lane goes on in another that begins this far to the side ...
-_GAP = 10.0  # ... and this far away, at most [m]
+_GAP = 20.0  # ... and this far away, at most [m] ...
+_TURNS_BACK = -0.5  # ... unless that leads back: cosine of the angle between them
+_LENGTHS, _WIDTHS = 1.0, 0.5  # steps between the sizes that there are paths for [m]
 _EXTENT = 20.0  # a path goes on beyond its last lane [m]
+
+
+class Size(NamedTuple):
+    """Cars that share their paths: what cars of both lengths sweep holds all that are in between."""
+
+    shortest: float  # [m]
+    longest: float
+    width: float
+
+
+def size_of(length: float, width: float) -> Size:
+    """The size of a car, rounded up; stock cars and others on the grid have a size of their own."""
+    steps = length / _LENGTHS
+    shortest = max(float(np.floor(steps + 1e-9)), 1.0) * _LENGTHS
+    longest = max(float(np.ceil(steps - 1e-9)), 1.0) * _LENGTHS
+    return Size(shortest, longest, float(np.ceil(width / _WIDTHS - 1e-9)) * _WIDTHS)
+
+
+STOCK = size_of(CAR_LENGTH, CAR_WIDTH)
 
 
 def walks(network) -> list[list[tuple]]:
@@ -61,7 +83,8 @@ def _goes_on(lane, following) -> bool:
     """Does a lane lead to another? highway-env's roundabouts have gaps and corners where they meet their arms."""
     where, heading = lane.position(lane.length, 0.0), lane.heading_at(lane.length)
     s, lateral = following.local_coordinates(where)
-    return bool(abs(lateral) < _JOIN and abs(s) < _GAP and np.cos(heading - following.heading_at(s)) > 0.0)
+    ahead = np.cos(heading - following.heading_at(s)) > _TURNS_BACK
+    return bool(abs(lateral) < _JOIN and abs(s) < _GAP and ahead)
 
 
 def _is_on_ring(network, index) -> bool:
@@ -82,14 +105,28 @@ def _walks_from(network, walk) -> Iterator[list[tuple]]:
         yield from _walks_from(network, [*walk, index])
 
 
-def compile_paths(network, top_speed: float, room: float = 0.0) -> Paths:
-    """Paths, swept widths and conflict areas of a `highway_env.road.road.RoadNetwork`.
+class Layout(NamedTuple):
+    """Paths without the widths that cars sweep. P paths of at most C cells, L lanes."""
 
-    Args:
-      network: the road network.
-      top_speed: drivers are expected up to this speed [m/s].
-      room: the ego may be this much further to either side than these drivers [m].
-    """
+    lanes: np.ndarray  # `[L]` LANE
+    ways: list[list[int]]  # lanes of each path
+    starts: list[np.ndarray]  # arc lengths at which they begin on it [m]
+    cells: np.ndarray  # `[P]`
+    lane: np.ndarray  # `[P, C]` lane that a car in the cell follows
+    offset: np.ndarray  # `[P, L]` as in `Paths`
+    rank: np.ndarray  # `[L]` who goes first
+
+
+class Swept(NamedTuple):
+    """What cars of one size sweep on each path, and where that is in the way of the ego."""
+
+    boxes: np.ndarray  # `[P, C, 6]`
+    conflicts: np.ndarray  # `[P, P, C, 4]` as in `Paths`
+    first: np.ndarray  # `[P, P, C]` likewise
+
+
+def lay_out(network) -> Layout:
+    """The paths of a `highway_env.road.road.RoadNetwork`."""
     indices = list(network.lanes_dict())
     number = {index: i for i, index in enumerate(indices)}
     lanes = compile_network(network, False).lanes
@@ -97,37 +134,68 @@ def compile_paths(network, top_speed: float, room: float = 0.0) -> Paths:
     ring = np.array([_is_on_ring(network, index) for index in indices])
     starts = [_starts(lanes, way) for way in ways]
     cells = np.array([int(np.ceil((start[-1] + _EXTENT) / CELL)) for start in starts])
-
-    count, size = len(ways), int(cells.max())
-    boxes, lane = np.zeros((count, size, 6)), np.full((count, size), -1)
-    offset = np.full((count, len(indices)), np.nan)
+    lane = np.full((len(ways), int(cells.max())), -1)
+    offset = np.full((len(ways), len(indices)), np.nan)
     for p, (way, start) in enumerate(zip(ways, starts, strict=True)):
         offset[p, way] = start[:-1]
         ends = start[:-2] + lanes["length"][way[:-1]] - CAR_LENGTH / 2  # where a driver heads for the next lane
         lane[p, : cells[p]] = np.array(way)[np.searchsorted(ends, np.arange(cells[p]) * CELL, side="right")]
-        poses = _tracked(lanes, np.array(way), start, int(cells[p]), top_speed)
-        swept_boxes(poses, CAR_LENGTH / 2, CAR_WIDTH / 2, MARGIN_LON, MARGIN_LAT, boxes[p, : cells[p]])
-    swept = boxes.copy()
-    swept[..., HALF_WIDTH] += room
-    swept[..., HALF_LENGTH] += 0.5 * room  # who turns more than they do reaches further, too
-    conflicts = np.full((count, count, size, 4), np.inf, np.float32)
-    conflicts[..., 1::2] = -np.inf
-    first = np.full((count, count, size), np.inf, np.float32)
-    find_conflicts(swept, boxes, cells, conflicts, first)
     rank = np.where(ring | ~ring.any(), lanes["priority"], lanes["priority"] - 1)  # who is on a ring goes first
+    return Layout(lanes, ways, starts, cells, lane, offset, rank)
+
+
+def sweep(layout: Layout, top_speed: float, dt: float, size: Size) -> np.ndarray:
+    """Boxes `[P, C, 6]` around all cars of one size.
+
+    Args:
+      layout: `Layout`.
+      top_speed: drivers are expected up to this speed [m/s].
+      dt: length of a frame, in which drivers steer [s].
+      size: `Size`.
+    """
+    boxes = np.zeros((*layout.lane.shape, 6))
+    for p, (way, start) in enumerate(zip(layout.ways, layout.starts, strict=True)):
+        cells = int(layout.cells[p])
+        poses = _tracked(layout.lanes, np.array(way), start, cells, top_speed, dt, size)
+        swept_boxes(poses, size.longest / 2, size.width / 2, MARGIN_LON, MARGIN_LAT, boxes[p, :cells])
+    return boxes
+
+
+def widened(boxes, room: float) -> np.ndarray:
+    """The boxes of an ego that may be `room` further to either side [m]."""
+    boxes = boxes.copy()
+    boxes[..., HALF_WIDTH] += room
+    boxes[..., HALF_LENGTH] += 0.5 * room  # who turns more than they do reaches further, too
+    return boxes
+
+
+def meet(layout: Layout, ego, boxes) -> Swept:
+    """Conflict areas of what the ego sweeps `[P, C, 6]` with what cars of one size sweep."""
+    conflicts = np.full((len(ego), *layout.lane.shape[:1], layout.lane.shape[1], 4), np.inf, np.float32)
+    conflicts[..., 1::2] = -np.inf
+    first = np.full(conflicts.shape[:3], np.inf, np.float32)
+    find_conflicts(ego, boxes, layout.cells, conflicts, first)
+    return Swept(boxes, conflicts, first)
+
+
+def join(layout: Layout, ego, swept: list[Swept]) -> Paths:
+    """`Paths` of an ego that sweeps boxes `[P, C, 6]`, among cars of several sizes; its own comes first."""
+    times = len(swept)
+    conflicts = np.concatenate([one.conflicts for one in swept], 1)
+    lane, offset = np.tile(layout.lane, (times, 1)), np.tile(layout.offset, (times, 1))
     return Paths(
-        swept,
-        cells,
+        ego,
+        np.tile(layout.cells, times),
         lane,
         _reached(lane),
         offset,
         conflicts,
-        first,
-        _priorities(lane, offset, conflicts, rank),
-        _crossed(lane, offset, conflicts),
-        np.where(lane >= 0, lanes["speed_limit"][lane], np.inf),
-        boxes,
-        _joins(lane, offset),
+        np.concatenate([one.first for one in swept], 1),
+        np.tile(_priorities(layout.lane, layout.offset, swept[0].conflicts, layout.rank), (1, times)),
+        np.tile(_crossed(layout.lane, offset, conflicts), (times, 1)),
+        np.where(layout.lane >= 0, layout.lanes["speed_limit"][layout.lane], np.inf),
+        np.concatenate([one.boxes for one in swept]),
+        np.tile(_joins(layout.lane, layout.offset), (1, times, 1)),
     )
 
 
@@ -157,17 +225,27 @@ def _starts(lanes, way) -> np.ndarray:
     return np.array([*starts, starts[-1] + lanes[way[-1]]["length"]])
 
 
-def _tracked(lanes, way, start, cells: int, top_speed: float) -> np.ndarray:
+def _tracked(lanes, way, start, cells: int, top_speed: float, dt: float, size: Size) -> np.ndarray:
     """Poses `[C, V, 3]` of cars that drive along a way, at the edges and the middle of each cell."""
     s = (np.arange(cells)[:, None] + np.array([0.0, 0.5, 1.0])) * CELL
     poses = [_centre(lanes, way, start, s)]
+    places = max(int(np.ceil(dt / _TRACK_DT - 1e-6)), 1)
     for share in _SHARES:
-        track = np.zeros((int((start[-1] + _EXTENT) / (share * top_speed * _TRACK_DT)) + 2, 4))
-        track = track[: drive(lanes, way, start, share * top_speed, _TRACK_DT, track)]
-        along = np.maximum.accumulate(track[:, 0])
-        driven = [np.interp(s, along, np.unwrap(track[:, k]) if k == 3 else track[:, k]) for k in (1, 2, 3)]
-        poses.append(np.where((s <= along[-1])[..., None], np.stack(driven, -1), np.nan))
+        speed = share * top_speed
+        for length in sorted({size.shortest, size.longest}):
+            for place in range(places):
+                begin = speed * dt * place / places
+                track = np.zeros((int((start[-1] + _EXTENT) / (speed * dt)) + 2, 4))
+                track = track[: drive(lanes, way, start, speed, dt, track, length, begin)]
+                poses.append(_interpolated(track, s, begin))
     return np.concatenate(poses, 1)
+
+
+def _interpolated(track, s, begin: float) -> np.ndarray:
+    """Poses at arc lengths `s`, from a drive that began at `begin` [m]; nan where it did not come by."""
+    along = np.maximum.accumulate(track[:, 0])
+    driven = [np.interp(s, along, np.unwrap(track[:, k]) if k == 3 else track[:, k]) for k in (1, 2, 3)]
+    return np.where(((s >= begin) & (s <= along[-1]))[..., None], np.stack(driven, -1), np.nan)
 
 
 def _centre(lanes, way, start, s) -> np.ndarray:
@@ -181,28 +259,30 @@ def _centre(lanes, way, start, s) -> np.ndarray:
 
 
 @compiled_for_arrays
-def drive(lanes, way, start, speed, dt, track):
+def drive(lanes, way, start, speed, dt, track, length=CAR_LENGTH, begin=0.0):
     """Drive along a way at constant speed with the simulator's steering law; returns the frames driven.
 
     Args:
       lanes: `[L]` LANE.
       way: lanes in order, start: arc lengths at which they begin.
       track: `[T, 4]` arc length, x, y and heading of each frame, overwritten.
+      length: of the car [m].
+      begin: arc length at which it starts [m].
     """
     k = 0
-    x, y = position(lanes[way[0]], 0.0, 0.0)
-    heading = heading_at(lanes[way[0]], 0.0)
+    x, y = position(lanes[way[0]], begin, 0.0)
+    heading = heading_at(lanes[way[0]], begin)
     for t in range(len(track)):
         s, lateral = local_coordinates(lanes[way[k]], x, y)
         if k + 1 < len(way) and is_after_end(lanes[way[k]], s):
             k += 1
             s, lateral = local_coordinates(lanes[way[k]], x, y)
         track[t, 0], track[t, 1], track[t, 2], track[t, 3] = start[k] + s, x, y, heading
-        steering = steering_angle(lanes[way[k]], s, lateral, heading, speed, CAR_LENGTH)
+        steering = steering_angle(lanes[way[k]], s, lateral, heading, speed, length)
         slip = np.arctan(0.5 * np.tan(steering))
         x += speed * np.cos(heading + slip) * dt
         y += speed * np.sin(heading + slip) * dt
-        heading += speed * np.sin(slip) / (CAR_LENGTH / 2) * dt
+        heading += speed * np.sin(slip) / (length / 2) * dt
     return len(track)
 
 

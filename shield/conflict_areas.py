@@ -19,20 +19,24 @@ _NOTHING = np.inf
 
 
 class Paths(NamedTuple):
-    """All paths of a road network. P paths of at most C cells, L lanes, at most T paths through a lane."""
+    """All paths of a road network. P paths of at most C cells, L lanes.
+
+    Others come in several sizes, and a path that a car of another size takes is one of its own: Q of them, those of
+    the ego's size first. Row k P + p is path p of the ego as cars of the k-th size drive it.
+    """
 
     boxes: np.ndarray  # `[P, C, 6]` what the ego sweeps in each cell
-    cells: np.ndarray  # `[P]` cells of each path
-    lane: np.ndarray  # `[P, C]` lane that a car in the cell follows
-    reached: np.ndarray  # `[P, C]` int32: cell in which a path reaches the lane of a cell
-    offset: np.ndarray  # `[P, L]` arc length at which a lane begins on a path, nan = not part of it [m]
-    conflicts: np.ndarray  # `[P, P, C, 4]` float32: from, to, from, to on the second path [m]; inf, -inf = none
-    first: np.ndarray  # `[P, P, C]` float32: where the second path first conflicts with the first from a cell on [m]
-    priority: np.ndarray  # `[P, P]` +1: the first has the right of way over the second, -1: the other way round
-    crossed: np.ndarray  # `[P, C]` a car standing there is in the way of a path that it is not on
+    cells: np.ndarray  # `[Q]` cells of each path
+    lane: np.ndarray  # `[Q, C]` lane that a car in the cell follows
+    reached: np.ndarray  # `[Q, C]` int32: cell in which a path reaches the lane of a cell
+    offset: np.ndarray  # `[Q, L]` arc length at which a lane begins on a path, nan = not part of it [m]
+    conflicts: np.ndarray  # `[P, Q, C, 4]` float32: from, to, from, to on the second path [m]; inf, -inf = none
+    first: np.ndarray  # `[P, Q, C]` float32: where the second path first conflicts with the first from a cell on [m]
+    priority: np.ndarray  # `[P, Q]` +1: the first has the right of way over the second, -1: the other way round
+    crossed: np.ndarray  # `[Q, C]` an ego standing there is in the way of a path that it is not on
     speed_limit: np.ndarray  # `[P, C]` [m/s], inf = none
-    swept: np.ndarray  # `[P, C, 6]` what others sweep in each cell
-    joins: np.ndarray  # `[P, P, C]` int32: next cell of the first path on a lane of the second; `FAR` = none
+    swept: np.ndarray  # `[Q, C, 6]` what others sweep in each cell
+    joins: np.ndarray  # `[P, Q, C]` int32: next cell of the first path on a lane of the second; `FAR` = none
 
 
 @compiled
@@ -121,8 +125,8 @@ def find_conflicts(boxes, others, cells, conflicts, first):
     """Fill in `Paths.conflicts` and `Paths.first`.
 
     Args:
-      boxes: `[P, C, 6]` swept by the ego on each path, others: likewise by everybody else.
-      cells: as in `Paths`.
+      boxes: `[P, C, 6]` swept by the ego on each path, others: likewise by cars of one size.
+      cells: `[P]` cells of each path.
       conflicts: `[P, P, C, 4]`, first: `[P, P, C]`, overwritten.
     """
     paths = len(cells)

@@ -26,6 +26,7 @@ from shield.blame import (
     OTHER,
     REVERSED,
     TOO_FAR,
+    TOO_HARD,
     WAVERED,
     Verdict,
 )
@@ -69,10 +70,11 @@ CROSSING = np.dtype(
         ("age", "i8"),  # samples since first sight
         ("since", "i8"),  # frames since the last sample with a plan; 0 = there is one now
         ("items", "i8"),  # plans at that sample: STOP, GO or both; 0 = never any
-        ("follows", "?"),  # was behind the ego at the last sample
+        ("follows", "?"),  # was the ego's follower at the last sample, on one of its ways at least
         ("behind", "?"),  # and has been so at a safe distance
         ("relied", "?"),  # is counted on to give way on this frame
         ("relied_before", "?"),  # was so on the frame before
+        ("way", "i8"),  # path of the ego then
         ("wreck", "?"),  # at the last sample
         ("astray", "?"),  # was on no path then
         ("x", "f8"),  # at the last sample
@@ -144,7 +146,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
     sort_out(scene, memory, entry)
     examine(scene, samples, which, SLACK + scene.drift)
     limited = limit(nominal, scene.track.v, scene.ego, scene.dt)
-    a, clear, trapped = limited, False, False
+    a, clear, trapped = nominal, False, False
     if overrides:
         a, clear, trapped = _choose(scene, plan, limited, at_line, holds)
         if trapped:
@@ -155,10 +157,13 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         dangerous, kept = judge_user(scene, i, samples[i], memory[i], a, known, trapped)
         pairs += dangerous
         broken += not kept
-    response = RESPONSE_BRAKE if a < limited else RESPONSE_GO if a > limited else 0
+    changed = overrides and a != limited
+    response = 0
+    if changed:
+        response = RESPONSE_BRAKE if a < limited else RESPONSE_GO
     return JunctionReport(
         a,
-        a != limited,
+        changed,
         limited != nominal and a == limited,
         response,
         pairs,
@@ -176,9 +181,9 @@ def has_plan(scene, memory, entry, at_line):
 
     Nobody may find the ego closer ahead than a follower's safe distance who did not follow it before.
     """
-    _find_followers(scene, memory)
+    _find_those_behind(scene, memory)
     for i in range(len(memory)):
-        follows, gap_is_safe = _is_behind(scene, i)
+        _, follows, gap_is_safe = _is_behind(scene, i)
         if follows and not (gap_is_safe or memory[i].behind):
             return False
     sort_out(scene, memory, entry)
@@ -213,11 +218,26 @@ def sort_out(scene, memory, entry):
 
 
 @inner
-def _find_followers(scene, memory):
-    """Note who drives behind the ego."""
+def _find_those_behind(scene, memory):
+    """Note who drives behind the ego, at whatever distance."""
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         threat.follows = threat.path >= 0 and is_follower(scene, threat, memory[threat.user].behind)
+
+
+@inner
+def _find_followers(scene, memory):
+    """Note who has to keep its distance behind the ego.
+
+    Whoever comes to be behind it at less than its distance is none yet, whether it merged or the ego did: plans go on
+    staying clear of it, as they did before. Who was there at first sight is one at any distance.
+    """
+    _find_those_behind(scene, memory)
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        known = memory[threat.user]
+        if threat.follows and known.age > 0 and not known.follows:
+            threat.follows = _keeps_distance(scene, threat)
 
 
 @compiled
@@ -334,36 +354,41 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     """
     _judge_motion(sample, memory, scene.other, scene.dt)
     scene = _alone_with(scene, i)
-    follows, gap_is_safe = _is_behind(scene, i)
-    dangerous, kept, items, cut_in, followed = False, True, STOP, False, False
-    if follows:
-        memory.behind |= gap_is_safe
-        items = STOP if memory.behind else 0
-        cut_in = not (memory.follows or clear) and memory.age > 0 and items == 0 and memory.other_broke == KEPT
-    else:
-        followed, memory.behind = memory.behind, False
-        strongest = limit(scene.ego.a_max_accel, scene.track.v, scene.ego, scene.dt)
+    may_follow, follows, gap_is_safe = _is_behind(scene, i)
+    dangerous, kept, items, cut_in = False, True, STOP, False
+    followed, memory.behind = memory.behind, may_follow and (memory.behind or gap_is_safe)
+    if not follows:
+        strongest = max(limit(scene.ego.a_max_accel, scene.track.v, scene.ego, scene.dt), a)
         if stop_conflict(scene, strongest, i, ANYWHERE, 0.0) != NEVER:
             dangerous = True
             if not clear:
                 items, kept = _plans_and_duty(scene, i, a)
+        had_plan = memory.age > 0 and memory.since == 0 and not followed
+        cut_in = items == 0 and had_plan and memory.way != scene.track.path and memory.other_broke == KEPT
+    if may_follow and not memory.behind:
+        items = 0
+    too_hard = may_follow and a < -scene.ego.a_max_brake - _TOLERANCE
+    if too_hard and not gap_is_safe:
+        dangerous, kept = True, False
     if items != 0:
         memory.items, memory.since = items, 0
-        memory.ego_broke = memory.other_broke = KEPT
-        memory.ego_excess = memory.other_excess = 0.0
+        memory.other_broke, memory.other_excess = KEPT, 0.0
+        # having braked too hard in front of a follower counts until that has its distance again
+        if memory.ego_broke != TOO_HARD or gap_is_safe or not may_follow:
+            memory.ego_broke, memory.ego_excess = KEPT, 0.0
     else:
         memory.since += 1
-        if followed and memory.other_broke == KEPT:  # their ways part, and it had not kept its distance
-            memory.other_broke = TOO_FAR
+        if followed and not may_follow and memory.other_broke == KEPT:
+            memory.other_broke = TOO_FAR  # their ways part, and it had not kept its distance
     if cut_in:
-        dangerous, kept = True, False
+        kept = False
         memory.ego_broke = CUT_IN
-    memory.follows = follows
-    if not kept and memory.ego_broke == KEPT:
-        memory.ego_broke = LEFT_NO_PLAN if items != 0 else WAVERED
+    if memory.ego_broke == KEPT and (too_hard or not kept):
+        memory.ego_broke = TOO_HARD if too_hard else LEFT_NO_PLAN if items != 0 else WAVERED
         memory.ego_excess = abs(a)
     if trapped and not kept and not cut_in:
         kept = _is_resolute(scene, a)
+    memory.follows, memory.way = may_follow, scene.track.path
     memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
     memory.reachable = sample.reachable
     memory.wreck, memory.astray = sample.wreck, sample.astray
@@ -409,20 +434,24 @@ def _judge_motion(sample, memory, other, dt):
 
 @inner
 def _is_behind(scene, i):
-    """Does a road user follow the ego, whatever way it takes, and at a safe distance (Lemma 2)?"""
-    behind, safe, other = False, True, scene.other
+    """Does a road user follow the ego on any of its ways, on all of them, and at a safe distance on those (Lemma 2)?"""
+    some, every, safe = False, True, True
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if threat.user != i:
             continue
-        if not threat.follows:
-            return False, False
-        behind = True
-        distance = behind_by(scene.paths, scene.track, threat)
-        gap = distance - scene.track.half_length - threat.half_length
-        # where their ways have parted already, no distance is needed
-        safe = safe and (distance < 0.0 or gap >= distance_behind(threat, max(threat.v, 0.0), scene.track.v, other))
-    return behind, safe
+        some |= threat.follows
+        every &= threat.follows
+        safe = safe and (not threat.follows or _keeps_distance(scene, threat))
+    return some, some and every, safe
+
+
+@inner
+def _keeps_distance(scene, threat):
+    """Is a road user behind the ego at a safe distance (Lemma 2)? Where their ways have parted none is needed."""
+    distance = behind_by(scene.paths, scene.track, threat)
+    gap = distance - scene.track.half_length - threat.half_length
+    return distance < 0.0 or gap >= distance_behind(threat, max(threat.v, 0.0), scene.track.v, scene.other)
 
 
 @apart
@@ -471,7 +500,7 @@ def judge_crossing(sample, memory, outside, other, dt):
     if outside and memory.other_broke == KEPT:
         memory.other_broke = LEFT_PATHS
     ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
-    if memory.behind:
+    if memory.behind and not ego_broke:
         verdict = OTHER
         if memory.other_broke == KEPT:
             memory.other_broke = TOO_FAR
@@ -499,7 +528,7 @@ def _ttc(scene):
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if threat.path >= 0 and threat.v < track.v:
-            s = on_path_of_ego(scene.paths, track.path, track.s, threat, threat.s)
+            s = on_path_of_ego(scene.paths, track, track.s, threat, threat.s)
             gap = s - track.s - track.half_length - threat.half_length
             if track.s <= s < np.inf:
                 ttc = min(ttc, time_to_collision(gap, track.v - threat.v))

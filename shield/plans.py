@@ -40,7 +40,7 @@ _SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
 _REVERSE = 1.0  # a car that reverses may go on for this long [s]
 _TAIL = 3  # frames between two moments at which a go plan may begin to brake
 _LONGEST = 10.0  # throttle phase of a plan, at most [s]
-_BODIES = 8.0  # cars that follow each other are in each other's way that far apart, margins included [m]
+_BETWEEN = 3.0  # cars that follow each other are in each other's way with so much between them, margins included [m]
 _REST = 1e-9  # below this speed a plan has come to rest [m/s]
 _STRIDE = 8  # frames of a plan that are looked at together
 _FEW = 250.0  # frames, in which rounding ...
@@ -156,7 +156,7 @@ def follows(scene, s, v, threat, t):
     track, other = scene.track, scene.other
     if threat.path < 0 or threat.wreck or not _shares_lane(scene.paths, track.path, s, threat):
         return False
-    s_other = on_path_of_ego(scene.paths, track.path, s, threat, farthest(threat, t, other))
+    s_other = on_path_of_ego(scene.paths, track, s, threat, farthest(threat, t, other))
     gap = s - track.half_length - threat.half_length - s_other
     return gap > 0.0 and gap >= distance_behind(threat, fastest(threat, t, other), v, other)
 
@@ -186,20 +186,22 @@ def distance_behind(threat, v_threat, v, other):
 
 
 @inner
-def on_path_of_ego(paths, path, s, threat, s_threat):
+def on_path_of_ego(paths, track, s, threat, s_threat):
     """Arc length of a road user as the ego counts it, inf where it does not drive along the ego's lane [m]."""
+    path = track.path
     lane = paths.lane[path, cell_of(s, paths.cells[path])]
     offset = paths.offset[threat.path, lane]
     if np.isnan(offset):
         return np.inf
     s_other = s_threat - offset + paths.offset[path, lane]
-    return s_other if s_other >= s or _comes_from_behind(paths, path, s, threat, s_threat, s - s_other) else np.inf
+    return s_other if s_other >= s or _comes_from_behind(paths, track, s, threat, s_threat, s - s_other) else np.inf
 
 
 @inner
-def _comes_from_behind(paths, path, s, threat, s_threat, distance):
+def _comes_from_behind(paths, track, s, threat, s_threat, distance):
     """Does a road user at `distance` [m] behind the ego not come in its way before? On a ring everybody is behind."""
-    return paths.first[path, threat.path, cell_of(s, paths.cells[path])] - s_threat >= distance - _BODIES
+    first = paths.first[track.path, threat.path, cell_of(s, paths.cells[track.path])]
+    return first - s_threat >= distance - (track.half_length + threat.half_length + _BETWEEN)
 
 
 @inner
@@ -210,7 +212,7 @@ def behind_by(paths, track, threat):
     if np.isnan(offset):
         return -np.inf
     distance = track.s - (threat.s - paths.offset[threat.path, lane] + offset)
-    clear = _comes_from_behind(paths, track.path, track.s, threat, threat.s, distance)
+    clear = _comes_from_behind(paths, track, track.s, threat, threat.s, distance)
     return distance if distance <= 0.0 or clear else -np.inf
 
 

@@ -302,7 +302,7 @@ class Engine:
         watched = n if settings else 0
         frames = ways = past = crossings = None
         if scheme_of(scenario.stock) == PLANS:
-            ways = compile_ways(network, net) if settings else no_ways()
+            ways = compile_ways(network, net, float(scenario.config["dt"][0])) if settings else no_ways()
             crossings = np.zeros((num_envs, watched), CROSSING)
         else:
             frames = compile_lane_frames(network) if settings else no_lane_frames()

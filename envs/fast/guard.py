@@ -54,9 +54,15 @@ class Watch(NamedTuple):
     max_slip: float  # that the ego can steer [rad]
 
 
-def compile_ways(network, net: Network) -> Ways:
-    """The paths through the junctions of a `highway_env.road.road.RoadNetwork`; `net`: the same as arrays."""
-    junction = junction_of(network)
+def compile_ways(network, net: Network, dt: float) -> Ways:
+    """The paths through the junctions of a `highway_env.road.road.RoadNetwork`.
+
+    Args:
+      network: the road network.
+      net: the same as arrays.
+      dt: length of a frame [s].
+    """
+    junction = junction_of(network, dt=dt)
     return Ways(junction.roads, _choices(junction, network, net))
 
 
@@ -220,7 +226,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
 def _keep_plan(cars, episode, sight, plans, settings, step):
     """Defs. 14-18: a plan through the junction ahead."""
     car, n = cars[episode.ego], episode.cars - 1
-    scene = _scene(cars, episode, sight, plans, settings)
+    scene = _scene(cars, episode, sight, plans, settings, False)
     report = junction_frame(
         scene,
         sight.samples[:n],
@@ -276,18 +282,23 @@ def _refuse_lane_change(before, cars, episode, sight, plans, settings):
     if ego.target_lane == before or lanes[ego.target_lane].road != lanes[before].road:
         return
     n, path = episode.cars - 1, episode.path
-    scene = _scene(cars, episode, sight, plans, settings)
+    scene = _scene(cars, episode, sight, plans, settings, False)
     if not has_plan(scene, plans.crossings[:n], settings.entry, not settings.waits_anywhere):
         ego.target_lane, episode.path = before, path
         episode.refused = True
 
 
 @merged
-def _scene(cars, episode, sight, plans, settings):
-    """The ego's track and the ways that the others may take."""
+def _scene(cars, episode, sight, plans, settings, judging):
+    """The ego's track and the ways that the others may take.
+
+    A contact flags both cars at once, so who had crashed is read off the frame before where it is judged.
+    """
     n, roads = episode.cars - 1, plans.ways.roads
     for i in range(n):
         _describe(cars[car_of(i, episode)], plans.ways.choice, sight.on_road[i])
+        if judging:
+            sight.on_road[i].wreck = plans.crossings[i].wreck
     _describe(cars[episode.ego], plans.ways.choice, sight.on_road[n])
     track = track_of(roads, sight.on_road[n], episode.path)
     episode.path = track.path
@@ -319,7 +330,7 @@ def _describe(car, choice, out):
         car.width,
     )
     out.wreck = car.crashed or car.kind == OBSTACLE
-    out.on, out.lane, out.choice = car.lane, -1, -1
+    out.size, out.on, out.lane, out.choice = 0, car.lane, -1, -1  # all are of one size
     if car.kind == TRAFFIC or car.kind == META:
         out.lane, out.choice = car.target_lane, choice[car.route + 1, car.target_lane]
 
@@ -376,7 +387,7 @@ def _verdict(i, cars, episode, sight, distances, plans, settings):
     """Who is to blame for the contact with road user `i`, and where the danger came from, as in `infos`."""
     ego, other, rules, dt = settings.ego, settings.other, settings.rules, settings.dt
     if plans is not None:
-        scene = _scene(cars, episode, sight, plans, settings)
+        scene = _scene(cars, episode, sight, plans, settings, True)
         outside = is_outside(scene.paths, scene.threats, i, sight.on_road[i])
         verdict = judge_crossing(sight.samples[i], plans.crossings[i], outside, other, dt)
         axes = verdict.axes + _PLANS
