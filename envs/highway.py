@@ -175,6 +175,8 @@ class ShieldedEgo:
     own `__dict__`, so a deep copy or a pickle of the environment carries its own shield along.
     """
 
+    is_ego = False  # of a wrapper, which reads its infos; else of a car of compliant traffic
+
     def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
         self.vehicle = vehicle
         self.settings = settings
@@ -200,6 +202,12 @@ class ShieldedEgo:
         self.tally = StepTally()
         self.record: list[Frame] | None = [] if record else None
         vehicle.act = self.act
+
+    def go_on_from(self, former: "ShieldedEgo") -> None:
+        """Take the place of another car: what counts since reset goes on."""
+        self.frames, self.frames_overridden = former.frames, former.frames_overridden
+        self.dangerous_pairs, self.broken_duties = former.dangerous_pairs, former.broken_duties
+        self.cost, self.min_ttc = former.cost, former.min_ttc
 
     # -- called by highway-env
 
@@ -285,8 +293,9 @@ class ShieldedEgo:
         """Find out who is on the road, and where."""
         vehicle = self.vehicle
         road = vehicle.road
-        others = [v for v in road.vehicles if v is not vehicle]
-        others += [o for o in road.objects if not isinstance(o, Landmark) and o.collidable]
+        users = [*road.vehicles, *(o for o in road.objects if not isinstance(o, Landmark))]
+        # who cannot be touched needs no distance
+        others = [v for v in users if v is not vehicle and v.collidable and vehicle.collidable]
         if others != self.others or len(self.before) != len(others) + 1:
             self._follow(others)
         self.poses = np.array([(*v.position, v.heading, v.speed) for v in [*others, vehicle]], dtype=float)

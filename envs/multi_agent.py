@@ -7,9 +7,10 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
-from envs.highway import Frame, Settings, ShieldedEgo
-from envs.shielding import attach, audit_of, begin_step, end_step, info_of
-from envs.traffic import shield_everybody
+from envs.egos import EgoShields
+from envs.highway import Frame, Settings
+from envs.shielding import audit_of, begin_step, end_step, info_of
+from envs.stock import check_frequencies
 from envs.wrapper import (
     check_action_type,
     check_conduct,
@@ -23,7 +24,7 @@ from shield.blame import Audit
 from shield.params import Preset, RSSParams, Rules
 
 
-class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
+class MultiAgentShield(EgoShields, RecordConstructorArgs):
     """`ShieldWrapper` for environments with several agents: each ego has its own shield and sees the others as cars.
 
     Actions, observations, rewards and ends are the environment's: tuples, or one value for all. Every info has
@@ -70,9 +71,9 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
             traffic=traffic,
             examine=examine,
         )
-        gym.Wrapper.__init__(self, env)
         check_options(mode, intervention_penalty, traffic)
         check_agents(env.unwrapped)
+        EgoShields.__init__(self, env)
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
@@ -80,7 +81,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
-        self._attach()
+        self._begin()
 
     @property
     def frames(self) -> tuple[list[Frame], ...]:
@@ -91,35 +92,27 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         """
         if not self.record:
             raise ValueError("record = False: expected True to keep the frames of an episode")
-        return tuple(ego.record or [] for ego in self._egos)
+        return tuple(ego.record or [] for ego in self._guard())
 
     def audit(self) -> tuple[Audit, ...]:
         """`ShieldWrapper.audit` for each agent. Needs `record=True`."""
         return tuple(audit_of(frames, self.settings) for frames in self.frames)
 
-    @property
-    def settings(self) -> Settings:
-        """The parameter table in force for every agent, response times rounded up to whole frames."""
-        return self._settings
-
-    @property
-    def drivers(self) -> list[ShieldedEgo]:
-        """Shields of the cars that are no agents, in compliant traffic."""
-        return self._drivers
-
     def reset(self, *, seed=None, options=None):
+        env: Any = self.env.unwrapped
+        check_frequencies(env.config | ((options or {}).get("config") or {}))
         observation, info = self.env.reset(seed=seed, options=options)
-        check_agents(self.env.unwrapped)
-        self._attach()
+        self._begin()
         info.update(agents=tuple(info_of(ego) for ego in self._egos), **traffic_info(self))
         return observation, info
 
     def step(self, action):
-        self._welcome()
-        had_contact = [begin_step(ego) for ego in self._egos]
+        egos = self._guard()
+        had_contact = [begin_step(ego) for ego in egos]
         reward: Any
         observation, reward, terminated, truncated, info = self.env.step(action)
-        agents = tuple(end_step(*one) for one in zip(self._egos, had_contact, action, strict=True))
+        egos = self._guard_after_step(egos)
+        agents = tuple(end_step(*one) for one in zip(egos, had_contact, action, strict=True))
         info.update(agents=agents, raw_reward=reward, **traffic_info(self))
         if self.intervention_penalty > 0.0:
             overridden = [agent["shield"]["override_fraction"] for agent in agents]
@@ -129,19 +122,10 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
                 reward = reward - self.intervention_penalty * np.mean(overridden)
         return observation, reward, terminated, truncated, info
 
-    def _attach(self) -> None:
+    def _current_settings(self) -> Settings:
         env: Any = self.env.unwrapped
-        self._settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
-        goal, among = env.config.get("destination"), self.traffic == "compliant"
-        self._egos = [attach(vehicle, self._settings, self.record, goal, among) for vehicle in env.controlled_vehicles]
-        self._drivers: list[ShieldedEgo] = []
-        self._welcome()
-
-    def _welcome(self) -> None:
-        """Shield the cars that have come since the last step."""
-        if self.traffic == "compliant":
-            env: Any = self.env.unwrapped
-            self._drivers = shield_everybody(env.road, self._drivers, self.settings)
+        check_agents(env)
+        return settings_for(env, self.params, self.rules, self.mode, self.conduct)
 
 
 def has_agents(env: Any) -> bool:
@@ -152,7 +136,12 @@ def has_agents(env: Any) -> bool:
 def check_agents(env: Any) -> None:
     """Can every agent of an environment be shielded?"""
     check_kind(env)
+    check_frequencies(env.config)
     if not has_agents(env):
         raise ValueError(f"action type {type(env.action_type).__name__} is for one agent; expected MultiAgentAction")
-    for action_type in env.action_type.agents_action_types:
+    kinds, vehicles = env.action_type.agents_action_types, env.controlled_vehicles
+    asked = env.config.get("controlled_vehicles", len(vehicles))
+    if not len(kinds) == len(vehicles) == asked:
+        raise ValueError(f"controlled_vehicles = {asked}: expected {len(kinds)}, as many as {type(env).__name__} has")
+    for action_type in kinds:
         check_action_type(action_type, env)
