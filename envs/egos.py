@@ -29,7 +29,7 @@ class EgoShields(gym.Wrapper):
             if isinstance(inner, EgoShields):
                 break
             inner = inner.env
-        if isinstance(inner, EgoShields) or any(egos_on(env.unwrapped)):
+        if isinstance(inner, EgoShields) or next(egos_on(env.unwrapped), None) is not None:
             raise ValueError(f"environment {env} is behind a shield already: expected one that is not (shield=None)")
 
     @property
@@ -43,12 +43,18 @@ class EgoShields(gym.Wrapper):
         env: Any = self.env.unwrapped
         return drivers_on(env.road)
 
+    def _check(self) -> None:
+        """Can the egos of the environment, as it is now, be shielded?"""
+        raise NotImplementedError
+
     def _current_settings(self) -> Settings:
-        """Settings for the environment as it is now, after a check that its egos can be shielded."""
+        """Settings for the environment as it is now."""
         raise NotImplementedError
 
     def _begin(self) -> None:
         """Put new shields on for a new episode."""
+        self._check()
+        self._settings = self._current_settings()
         env: Any = self.env.unwrapped
         for shield in list(egos_on(env)):
             _take_off(shield)
@@ -61,8 +67,10 @@ class EgoShields(gym.Wrapper):
         Raises:
           ValueError: an ego is not on the environment's road, or is behind a shield with other settings.
         """
+        self._check()
         env: Any = self.env.unwrapped
-        self._settings = self._current_settings()
+        if self._settings.dt != 1 / env.config["simulation_frequency"]:
+            self._settings = self._current_settings()
         self._egos = [self._shield_of(i, vehicle) for i, vehicle in enumerate(env.controlled_vehicles)]
         for shield in list(egos_on(env)):
             if shield not in self._egos:
@@ -73,9 +81,10 @@ class EgoShields(gym.Wrapper):
 
     def _shield_of(self, i: int, vehicle: Any) -> ShieldedEgo:
         env: Any = self.env.unwrapped
-        name = f"controlled_vehicles[{i}] = {vehicle}"
         if vehicle.road is not env.road or not any(vehicle is one for one in env.road.vehicles):
-            raise ValueError(f"{name} is not on the environment's road: expected one of road.vehicles")
+            raise ValueError(
+                f"controlled_vehicles[{i}] = {vehicle} is not on the environment's road: expected one of road.vehicles"
+            )
         shield = shield_on(vehicle)
         if shield is None or not shield.is_ego:
             among = self.traffic == "compliant"
@@ -85,8 +94,8 @@ class EgoShields(gym.Wrapper):
                 shield.go_on_from(self._egos[i])
         elif shield.settings != self._settings:
             raise ValueError(
-                f"{name} is behind a shield with other settings: expected one shield around an environment, and a "
-                "reset after a change of its configuration"
+                f"controlled_vehicles[{i}] = {vehicle} is behind a shield with other settings: expected one shield "
+                "around an environment, and a reset after a change of its configuration"
             )
         return shield
 

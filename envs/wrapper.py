@@ -178,10 +178,11 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         """The shield on the ego, whichever vehicle that is now."""
         return self._guard()[0]
 
+    def _check(self) -> None:
+        check_environment(self.env.unwrapped)
+
     def _current_settings(self) -> Settings:
-        env: Any = self.env.unwrapped
-        check_environment(env)
-        return settings_for(env, self.params, self.rules, self.mode, self.conduct)
+        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
 
 
 def traffic_info(wrapper) -> dict[str, Any]:
