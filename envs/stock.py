@@ -8,6 +8,7 @@ import gymnasium as gym
 import highway_env  # noqa: F401  registers the environments
 from gymnasium.wrappers import TimeLimit
 from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.envs.common.action import MultiAgentAction
 from highway_env.envs.intersection_env import IntersectionEnv
 from highway_env.utils import class_from_path
 from highway_env.vehicle.behavior import IDMVehicle
@@ -100,9 +101,10 @@ def _has_duration(env: Any) -> bool:
 class Upkeep:
     """What an environment needs besides highway-env's own code.
 
-    Its traffic keeps the parameters that it started with, whatever other environments do to classes; and where
-    highway-env does not look at `duration`, it ends the episode all the same. These methods lie in the environment's
-    own `__dict__`, so a deep copy or a pickle carries its own along.
+    Its traffic keeps the parameters that it started with, whatever other environments do to classes. Where highway-env
+    does not look at `duration`, it ends the episode all the same; where it does not look at `controlled_vehicles`,
+    several agents take the places of the first cars that drive the ego's way. These methods lie in the environment's own
+    `__dict__`, so a deep copy or a pickle carries its own along.
     """
 
     def __init__(self, env: Any) -> None:
@@ -113,6 +115,8 @@ class Upkeep:
             env._spawn_vehicle = self.spawn_vehicle
         if not _has_duration(env):
             env._is_truncated = self.is_truncated
+        if self._missing_agents() > 0:
+            env.reset()
 
     # -- called by highway-env
 
@@ -121,6 +125,7 @@ class Upkeep:
         with drivers_unchanged():
             type(self.env)._reset(self.env)
             self._settle()
+        self._seat_agents()
 
     def spawn_vehicle(self, *args, **kwargs):
         vehicle = type(self.env)._spawn_vehicle(self.env, *args, **kwargs)
@@ -136,6 +141,32 @@ class Upkeep:
     def is_truncated(self) -> bool:
         overdue = self.env.time >= self.env.config.get("duration", float("inf"))
         return bool(overdue or type(self.env)._is_truncated(self.env))
+
+    # -- agents
+
+    def _missing_agents(self) -> int:
+        """How many more agents are asked for than highway-env has put on the road."""
+        env = self.env
+        if not isinstance(env.action_type, MultiAgentAction):
+            return 0
+        return env.config.get("controlled_vehicles", 1) - len(env.controlled_vehicles)
+
+    def _seat_agents(self) -> None:
+        env, missing = self.env, self._missing_agents()
+        if missing <= 0:
+            return
+        vehicles, ego = env.road.vehicles, env.vehicle
+        # rewards make no sense for oncoming cars
+        places = [i for i, v in enumerate(vehicles) if isinstance(v, IDMVehicle) and v.direction @ ego.direction > 0.0]
+        if missing > len(places):
+            most = len(env.controlled_vehicles) + len(places)
+            raise ValueError(f"controlled_vehicles = {env.config['controlled_vehicles']}: expected at most {most}")
+        for i in places[:missing]:
+            car = vehicles[i]
+            agent = env.action_type.vehicle_class(env.road, car.position, car.heading, car.speed)
+            agent.target_lane_index, agent.route = car.target_lane_index, car.route
+            vehicles[i] = agent
+            env.controlled_vehicles = [*env.controlled_vehicles, agent]
 
     # -- parameters of drivers
 
