@@ -5,7 +5,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from envs.highway import Settings, ShieldedEgo
+from envs.highway import EARLIER_CONTACT, Settings, ShieldedEgo
 from envs.shielding import attach, shield_on
 from envs.traffic import drivers_on, shield_everybody
 
@@ -90,6 +90,8 @@ class EgoShields(gym.Wrapper):
             among = self.traffic == "compliant"
             shield = attach(vehicle, self._settings, self.record, env.config.get("destination"), among)
             shield.is_ego = True
+            if vehicle.crashed:
+                shield.contact = dict(EARLIER_CONTACT)
             if env.time > 0.0 and i < len(self._egos):
                 shield.go_on_from(self._egos[i])
         elif shield.settings != self._settings:

@@ -34,7 +34,17 @@ _CHAIN = 8  # lanes followed in either direction
 _SAMPLE = 2.0  # spacing of the pieces that stand in for a curve of changing curvature [m]
 
 AXES = {0: "inherited", LON: "longitudinal", LAT: "lateral", LON | LAT: "both"}
-
+# of a car that had its contact before there was a shield on it
+EARLIER_CONTACT = {
+    "verdict": "inherited",
+    "partner": -1,
+    "danger": "inherited",
+    "seconds_since_threshold": 0.0,
+    "ego_duty": "",
+    "ego_excess": 0.0,
+    "other_duty": "",
+    "other_excess": 0.0,
+}
 
 LANES, PLANS = range(2)  # distances along the lane (Defs. 1-10), or plans through junctions (Defs. 14-18)
 
@@ -356,8 +366,10 @@ class ShieldedEgo:
             self.contact = self._judge_contact()
         return self.contact is not None
 
-    def _judge_contact(self) -> dict:
+    def _judge_contact(self) -> dict | None:
         self._meet()
+        if not self.others:  # the flag was not raised by a contact
+            return None
         touching = [i for i, other in enumerate(self.others) if self._touches(other)]
         if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]

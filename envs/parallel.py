@@ -85,9 +85,7 @@ class ShieldedParallelEnv(ParallelEnv):
         if earned is None:  # an intersection says it, and its traffic has moved on since
             earned, ended = outcome_of_agents(self.env.unwrapped, joint)
         penalty = self.env.intervention_penalty
-        infos = tuple(
-            {**one, "raw_reward": float(reward)} for one, reward in zip(info["agents"], earned, strict=True)
-        )
+        infos = tuple({**one, "raw_reward": float(reward)} for one, reward in zip(info["agents"], earned, strict=True))
         rewards = tuple(one["raw_reward"] - penalty * one["shield"]["override_fraction"] for one in infos)
         terminations = self._of_agents([bool(one) for one in ended])
         truncations = dict.fromkeys(self.agents, bool(truncated))
