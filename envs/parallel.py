@@ -34,9 +34,9 @@ class ShieldedParallelEnv(ParallelEnv):
     """Agents "agent_0", "agent_1", ... in the order of the environment's controlled vehicles.
 
     The infos of an agent are those of its shield: see `ShieldWrapper`. Rewards and ends are the
-    agent's own, also where highway-env knows only those of the first: it is terminated when its car has crashed or
-    arrived, and truncated with everybody else when time is up. It then leaves `agents` while the others go on; its car stays on the road,
-    under its shield, with the action IDLE.
+    agent's own, also where highway-env knows only those of the first: it is terminated when its car
+    has crashed or arrived, and truncated with everybody else when time is up. It then leaves
+    `agents` while the others go on; its car stays on the road, under its shield, with the action IDLE.
 
     Args:
       env: `MultiAgentShield`; its penalty is subtracted from each agent's reward.

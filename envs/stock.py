@@ -103,8 +103,8 @@ class Upkeep:
 
     Its traffic keeps the parameters that it started with, whatever other environments do to classes. Where highway-env
     does not look at `duration`, it ends the episode all the same; where it does not look at `controlled_vehicles`,
-    several agents take the places of the first cars that drive the ego's way. These methods lie in the environment's own
-    `__dict__`, so a deep copy or a pickle carries its own along.
+    several agents take the places of the first cars that drive the ego's way. These methods lie in the environment's
+    own `__dict__`, so a deep copy or a pickle carries its own along.
     """
 
     def __init__(self, env: Any) -> None:

@@ -159,7 +159,7 @@ def test_episodes_end_alike_on_both_backends(env_id, config):
     [
         ({}, 100),
         ({"duration": 30}, 30),
-        ({"duration": 30, "policy_frequency": 3}, 90),
+        ({"duration": 30, "policy_frequency": 2}, 60),
         ({"duration": 30, "policy_frequency": 5}, 100),
     ],
 )
