@@ -34,7 +34,17 @@ _CHAIN = 8  # lanes followed in either direction
 _SAMPLE = 2.0  # spacing of the pieces that stand in for a curve of changing curvature [m]
 
 AXES = {0: "inherited", LON: "longitudinal", LAT: "lateral", LON | LAT: "both"}
-
+# of a car that had its contact before there was a shield on it
+EARLIER_CONTACT = {
+    "verdict": "inherited",
+    "partner": -1,
+    "danger": "inherited",
+    "seconds_since_threshold": 0.0,
+    "ego_duty": "",
+    "ego_excess": 0.0,
+    "other_duty": "",
+    "other_excess": 0.0,
+}
 
 LANES, PLANS = range(2)  # distances along the lane (Defs. 1-10), or plans through junctions (Defs. 14-18)
 
@@ -175,6 +185,8 @@ class ShieldedEgo:
     own `__dict__`, so a deep copy or a pickle of the environment carries its own shield along.
     """
 
+    is_ego = False  # of a wrapper, which reads its infos; else of a car of compliant traffic
+
     def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
         self.vehicle = vehicle
         self.settings = settings
@@ -201,6 +213,12 @@ class ShieldedEgo:
         self.record: list[Frame] | None = [] if record else None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
         vehicle.act = self.act
+
+    def go_on_from(self, former: "ShieldedEgo") -> None:
+        """Take the place of another car: what counts since reset goes on."""
+        self.frames, self.frames_overridden = former.frames, former.frames_overridden
+        self.dangerous_pairs, self.broken_duties = former.dangerous_pairs, former.broken_duties
+        self.cost, self.min_ttc = former.cost, former.min_ttc
 
     # -- called by highway-env
 
@@ -288,8 +306,9 @@ class ShieldedEgo:
         """Find out who is on the road, and where."""
         vehicle = self.vehicle
         road = vehicle.road
-        others = [v for v in road.vehicles if v is not vehicle]
-        others += [o for o in road.objects if not isinstance(o, Landmark) and o.collidable]
+        users = [*road.vehicles, *(o for o in road.objects if not isinstance(o, Landmark))]
+        # who cannot be touched needs no distance
+        others = [v for v in users if v is not vehicle and v.collidable and vehicle.collidable]
         if others != self.others or len(self.before) != len(others) + 1:
             self._follow(others)
         self.poses = np.array([(*v.position, v.heading, v.speed) for v in [*others, vehicle]], dtype=float)
@@ -350,8 +369,10 @@ class ShieldedEgo:
             self.contact = self._judge_contact()
         return self.contact is not None
 
-    def _judge_contact(self) -> dict:
+    def _judge_contact(self) -> dict | None:
         self._meet()
+        if not self.others:  # the flag was not raised by a contact
+            return None
         touching = [i for i, other in enumerate(self.others) if self._touches(other)]
         if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]

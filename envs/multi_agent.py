@@ -7,10 +7,11 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
-from envs.highway import Frame, Settings, ShieldedEgo
-from envs.risk import RiskMeter, check_risk
-from envs.shielding import attach, audit_of, begin_step, end_step, info_of
-from envs.traffic import shield_everybody
+from envs.egos import EgoShields
+from envs.highway import Frame, Settings
+from envs.risk import check_risk
+from envs.shielding import audit_of, begin_step, end_step, info_of
+from envs.stock import check_frequencies
 from envs.wrapper import (
     check_action_type,
     check_conduct,
@@ -25,7 +26,7 @@ from shield.params import Preset, RSSParams, Rules
 from shield.risk import RiskSettings
 
 
-class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
+class MultiAgentShield(EgoShields, RecordConstructorArgs):
     """`ShieldWrapper` for environments with several agents: each ego has its own shield and sees the others as cars.
 
     Actions, observations, rewards and ends are the environment's: tuples, or one value for all. Every info has
@@ -74,9 +75,9 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
             examine=examine,
             risk=risk,
         )
-        gym.Wrapper.__init__(self, env)
         check_options(mode, intervention_penalty, traffic)
         check_agents(env.unwrapped)
+        EgoShields.__init__(self, env)
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
@@ -85,7 +86,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         self.record = record
         self.traffic = traffic
         self.risk = check_risk(risk)
-        self._attach()
+        self._begin()
 
     @property
     def frames(self) -> tuple[list[Frame], ...]:
@@ -96,35 +97,27 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         """
         if not self.record:
             raise ValueError("record = False: expected True to keep the frames of an episode")
-        return tuple(ego.record or [] for ego in self._egos)
+        return tuple(ego.record or [] for ego in self._guard())
 
     def audit(self) -> tuple[Audit, ...]:
         """`ShieldWrapper.audit` for each agent. Needs `record=True`."""
         return tuple(audit_of(frames, self.settings) for frames in self.frames)
 
-    @property
-    def settings(self) -> Settings:
-        """The parameter table in force for every agent, response times rounded up to whole frames."""
-        return self._settings
-
-    @property
-    def drivers(self) -> list[ShieldedEgo]:
-        """Shields of the cars that are no agents, in compliant traffic."""
-        return self._drivers
-
     def reset(self, *, seed=None, options=None):
+        env: Any = self.env.unwrapped
+        check_frequencies(env.config | ((options or {}).get("config") or {}))
         observation, info = self.env.reset(seed=seed, options=options)
-        check_agents(self.env.unwrapped)
-        self._attach()
+        self._begin()
         info.update(agents=tuple(info_of(ego) for ego in self._egos), **traffic_info(self))
         return observation, info
 
     def step(self, action):
-        self._welcome()
-        had_contact = [begin_step(ego) for ego in self._egos]
+        egos = self._guard()
+        had_contact = [begin_step(ego) for ego in egos]
         reward: Any
         observation, reward, terminated, truncated, info = self.env.step(action)
-        agents = tuple(end_step(*one) for one in zip(self._egos, had_contact, action, strict=True))
+        egos = self._guard_after_step(egos)
+        agents = tuple(end_step(*one) for one in zip(egos, had_contact, action, strict=True))
         info.update(agents=agents, raw_reward=reward, **traffic_info(self))
         if self.intervention_penalty > 0.0:
             overridden = [agent["shield"]["override_fraction"] for agent in agents]
@@ -134,21 +127,31 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
                 reward = reward - self.intervention_penalty * np.mean(overridden)
         return observation, reward, terminated, truncated, info
 
-    def _attach(self) -> None:
-        env: Any = self.env.unwrapped
-        self._settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
-        goal, among = env.config.get("destination"), self.traffic == "compliant"
-        self._egos = [attach(vehicle, self._settings, self.record, goal, among) for vehicle in env.controlled_vehicles]
-        for ego in self._egos:
-            ego.meter = RiskMeter(self.risk) if self.risk is not None else None
-        self._drivers: list[ShieldedEgo] = []
-        self._welcome()
+    def _check(self) -> None:
+        check_agents(self.env.unwrapped)
 
-    def _welcome(self) -> None:
-        """Shield the cars that have come since the last step."""
-        if self.traffic == "compliant":
-            env: Any = self.env.unwrapped
-            self._drivers = shield_everybody(env.road, self._drivers, self.settings)
+    def _current_settings(self) -> Settings:
+        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
+
+
+def outcome_of_agents(env: Any, actions: tuple) -> tuple[list[float], list[bool]]:
+    """What each agent has earned in the last step, and whether its episode is over.
+
+    Where highway-env says it for its first agent only, its own functions are asked again from the seat of each.
+
+    Args:
+      env: highway-env's environment after a step, before anything else happens to it.
+      actions: of that step.
+    """
+    vehicles, rewards, ends = env.controlled_vehicles, [], []
+    try:
+        for vehicle, action in zip(vehicles, actions, strict=True):
+            env.controlled_vehicles = [vehicle]
+            rewards.append(float(env._reward(action)))
+            ends.append(bool(env._is_terminated()))
+    finally:
+        env.controlled_vehicles = vehicles
+    return rewards, ends
 
 
 def has_agents(env: Any) -> bool:
@@ -159,7 +162,12 @@ def has_agents(env: Any) -> bool:
 def check_agents(env: Any) -> None:
     """Can every agent of an environment be shielded?"""
     check_kind(env)
+    check_frequencies(env.config)
     if not has_agents(env):
         raise ValueError(f"action type {type(env.action_type).__name__} is for one agent; expected MultiAgentAction")
-    for action_type in env.action_type.agents_action_types:
+    kinds, vehicles = env.action_type.agents_action_types, env.controlled_vehicles
+    asked = env.config.get("controlled_vehicles", len(vehicles))
+    if not len(kinds) == len(vehicles) == asked:
+        raise ValueError(f"controlled_vehicles = {asked}: expected {len(kinds)}, as many as {type(env).__name__} has")
+    for action_type in kinds:
         check_action_type(action_type, env)

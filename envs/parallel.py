@@ -3,10 +3,9 @@
 from typing import Any
 
 from highway_env.envs.common.action import DiscreteMetaAction
-from highway_env.envs.intersection_env import IntersectionEnv
 from pettingzoo import ParallelEnv
 
-from envs.multi_agent import MultiAgentShield
+from envs.multi_agent import MultiAgentShield, outcome_of_agents
 from envs.scenarios import make
 
 
@@ -14,11 +13,13 @@ def parallel_env(env_id: str = "intersection-multi-agent-v0", **options) -> "Shi
     """An environment for several agents, each behind its own shield, as a PettingZoo `ParallelEnv`.
 
     Args:
-      env_id: "intersection-multi-agent-v0", "intersection-multi-agent-v1", "intersection-multi-agent-v2".
+      env_id: "intersection-multi-agent-v0", "intersection-multi-agent-v1", "intersection-multi-agent-v2", or any other
+        with a `config` for several agents: action type "MultiAgentAction", observation type "MultiAgentObservation"
+        and, on motorways, "controlled_vehicles".
       options: as for `envs.make`; `shield` is "override" or "monitor".
 
     Raises:
-      ValueError: whatever `make` objects to, no shield, or an environment that does not tell its agents apart.
+      ValueError: whatever `make` objects to, no shield, or an environment for one agent.
     """
     env = make(env_id, **options)
     if not isinstance(env, MultiAgentShield):
@@ -33,25 +34,19 @@ class ShieldedParallelEnv(ParallelEnv):
     """Agents "agent_0", "agent_1", ... in the order of the environment's controlled vehicles.
 
     The infos of an agent are those of its shield: see `ShieldWrapper`. Rewards and ends are the
-    agent's own: it is terminated when its car has crashed or arrived, and truncated with everybody
-    else when time is up. It then leaves `agents` while the others go on; its car stays on the road,
-    under its shield, with the action IDLE.
+    agent's own, also where highway-env knows only those of the first: it is terminated when its car
+    has crashed or arrived, and truncated with everybody else when time is up. It then leaves
+    `agents` while the others go on; its car stays on the road, under its shield, with the action IDLE.
 
     Args:
-      env: `MultiAgentShield` around an environment that says what each agent earns; its penalty is
-        subtracted from each agent's reward.
+      env: `MultiAgentShield`; its penalty is subtracted from each agent's reward.
 
     Raises:
-      ValueError: no rewards per agent, or an action type without IDLE.
+      ValueError: an action type without IDLE.
     """
 
     def __init__(self, env: MultiAgentShield) -> None:
         unwrapped: Any = env.unwrapped
-        if not isinstance(unwrapped, IntersectionEnv):
-            raise ValueError(
-                f"environment {type(unwrapped).__name__} does not say what each agent earns; "
-                "expected intersection-multi-agent-v0/-v1/-v2"
-            )
         for action_type in unwrapped.action_type.agents_action_types:
             if not isinstance(action_type, DiscreteMetaAction):
                 raise ValueError(f"action type {type(action_type).__name__} has no IDLE; expected DiscreteMetaAction")
@@ -86,13 +81,13 @@ class ShieldedParallelEnv(ParallelEnv):
         everybody = zip(self.possible_agents, self._idle, strict=True)
         joint = tuple(actions.get(agent, idle) for agent, idle in everybody)
         observations, _, _, truncated, info = self.env.step(joint)
+        earned, ended = info.get("agents_rewards"), info.get("agents_terminated")
+        if earned is None:  # an intersection says it, and its traffic has moved on since
+            earned, ended = outcome_of_agents(self.env.unwrapped, joint)
         penalty = self.env.intervention_penalty
-        infos = tuple(
-            {**one, "raw_reward": float(reward)}
-            for one, reward in zip(info["agents"], info["agents_rewards"], strict=True)
-        )
+        infos = tuple({**one, "raw_reward": float(reward)} for one, reward in zip(info["agents"], earned, strict=True))
         rewards = tuple(one["raw_reward"] - penalty * one["shield"]["override_fraction"] for one in infos)
-        terminations = self._of_agents([bool(ended) for ended in info["agents_terminated"]])
+        terminations = self._of_agents([bool(one) for one in ended])
         truncations = dict.fromkeys(self.agents, bool(truncated))
         outcome = self._of_agents(observations), self._of_agents(rewards), terminations, truncations
         of_agents = self._of_agents(infos)

@@ -31,6 +31,12 @@ def attach(
     return (TurnTaker if takes_turns and settings.overrides else JunctionEgo)(vehicle, settings, record)
 
 
+def shield_on(vehicle: Any) -> ShieldedEgo | None:
+    """The shield that a vehicle carries itself; a shallow copy of a vehicle carries that of the original."""
+    shield = getattr(vars(vehicle).get("act"), "__self__", None)
+    return shield if isinstance(shield, ShieldedEgo) and shield.vehicle is vehicle else None
+
+
 def begin_step(ego: ShieldedEgo) -> bool:
     """Start counting anew; returns whether the ego has had its contact before this step."""
     ego.tally = StepTally()

@@ -1,25 +1,187 @@
-"""highway-env's environments as they are, except that every episode ends."""
+"""highway-env's environments as they are, except that every episode ends and nothing is left behind in the process."""
 
 import warnings
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import gymnasium as gym
 import highway_env  # noqa: F401  registers the environments
 from gymnasium.wrappers import TimeLimit
+from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.envs.common.action import MultiAgentAction
+from highway_env.envs.intersection_env import IntersectionEnv
+from highway_env.utils import class_from_path
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.kinematics import Vehicle
 
 LONGEST_EPISODE = 100  # decisions, where highway-env sets no limit
+# what `IntersectionEnv` writes into the class of its traffic, and what `IDMVehicle` is defined with
+AT_INTERSECTIONS = {"DISTANCE_WANTED": 7.0, "COMFORT_ACC_MAX": 6.0, "COMFORT_ACC_MIN": -3.0}
+ELSEWHERE = {"DISTANCE_WANTED": 10.0, "COMFORT_ACC_MAX": 3.0, "COMFORT_ACC_MIN": -5.0}
 
 
 def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
-    """`gymnasium.make`, with a `TimeLimit` where there is no limit.
+    """`gymnasium.make`, with a `TimeLimit` where there is no limit, and with drivers of its own (`Upkeep`).
 
     highway-env ends a merge when the ego is past it. An ego that has stopped behind a wreck never is.
     That there is a later version of an environment asked for by its version is not said, once for each of a batch.
+
+    Raises:
+      ValueError: more decisions than frames.
     """
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*is out of date", DeprecationWarning)
-        env = gym.make(env_id, **kwargs)
+    with suppress(Exception):  # `gymnasium.make` complains; a class that exists before is left as it is
+        class_from_path(kwargs["config"]["other_vehicles_type"])
+    with drivers_unchanged():
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", ".*is out of date", DeprecationWarning)
+            env = gym.make(env_id, **kwargs)
+        unwrapped: Any = env.unwrapped
+        if not isinstance(unwrapped, AbstractEnv):
+            return env
+        check_frequencies(unwrapped.config)
+        Upkeep(unwrapped)
     limited = env.spec is not None and env.spec.max_episode_steps is not None
-    if limited or "duration" in getattr(env.unwrapped, "config", {"duration": None}):
-        return env
-    return TimeLimit(env, LONGEST_EPISODE)
+    return env if limited or _has_duration(unwrapped) else TimeLimit(env, LONGEST_EPISODE)
+
+
+def check_frequencies(config: dict) -> None:
+    """Does every decision last for a frame at least? Else nobody ever moves.
+
+    Raises:
+      ValueError: it does not, or one of the two is no frequency.
+    """
+    frames, decisions = config["simulation_frequency"], config["policy_frequency"]
+    if not frames > 0:
+        raise ValueError(f"simulation_frequency = {frames!r}: expected a number > 0 [Hz]")
+    if not 0 < decisions <= frames:
+        raise ValueError(
+            f"policy_frequency = {decisions!r} with simulation_frequency = {frames!r}: "
+            f"expected 0 < policy_frequency <= {frames:g} Hz, because a decision without a frame moves nobody"
+        )
+
+
+@contextmanager
+def drivers_unchanged():
+    """Inside, IDM drivers are as highway-env defines them; whatever is written into classes of vehicles is undone.
+
+    An `IntersectionEnv` rewrites the class of its traffic, and so all traffic in the process.
+    """
+    saved = {kind: _own(kind) for kind in _kinds(Vehicle)}
+    if _own(IDMVehicle) == AT_INTERSECTIONS:  # an intersection that was made elsewhere has left them behind
+        _write(IDMVehicle, ELSEWHERE)
+    try:
+        yield
+    finally:
+        for kind, values in saved.items():
+            _write(kind, values)
+
+
+def _kinds(kind: type) -> set[type]:
+    """A class and everything derived from it."""
+    return {kind}.union(*map(_kinds, kind.__subclasses__()))
+
+
+def _own(kind: type) -> dict[str, float]:
+    return {name: vars(kind)[name] for name in ELSEWHERE if name in vars(kind)}
+
+
+def _write(kind: type, values: dict[str, float]) -> None:
+    for name in _own(kind):
+        if name not in values:
+            delattr(kind, name)
+    for name, value in values.items():
+        setattr(kind, name, value)
+
+
+def _has_duration(env: Any) -> bool:
+    """Does an environment end by itself when `duration` is over?"""
+    return "duration" in type(env).default_config()
+
+
+class Upkeep:
+    """What an environment needs besides highway-env's own code.
+
+    Its traffic keeps the parameters that it started with, whatever other environments do to classes. Where highway-env
+    does not look at `duration`, it ends the episode all the same; where it does not look at `controlled_vehicles`,
+    several agents take the places of the first cars that drive the ego's way. These methods lie in the environment's
+    own `__dict__`, so a deep copy or a pickle carries its own along.
+    """
+
+    def __init__(self, env: Any) -> None:
+        self.env = env
+        self._settle()
+        env._reset, env.change_vehicles = self.reset, self.change_vehicles
+        if isinstance(env, IntersectionEnv):
+            env._spawn_vehicle = self.spawn_vehicle
+        if not _has_duration(env):
+            env._is_truncated = self.is_truncated
+        if self._missing_agents() > 0:
+            env.reset()
+
+    # -- called by highway-env
+
+    def reset(self) -> None:
+        check_frequencies(self.env.config)
+        with drivers_unchanged():
+            type(self.env)._reset(self.env)
+            self._settle()
+        self._seat_agents()
+
+    def spawn_vehicle(self, *args, **kwargs):
+        vehicle = type(self.env)._spawn_vehicle(self.env, *args, **kwargs)
+        self._keep(vehicle)
+        return vehicle
+
+    def change_vehicles(self, vehicle_class_path: str):
+        changed = type(self.env).change_vehicles(self.env, vehicle_class_path)
+        for vehicle in changed.road.vehicles:
+            self._keep(vehicle)
+        return changed
+
+    def is_truncated(self) -> bool:
+        overdue = self.env.time >= self.env.config.get("duration", float("inf"))
+        return bool(overdue or type(self.env)._is_truncated(self.env))
+
+    # -- agents
+
+    def _missing_agents(self) -> int:
+        """How many more agents are asked for than highway-env has put on the road."""
+        env = self.env
+        if not isinstance(env.action_type, MultiAgentAction):
+            return 0
+        return env.config.get("controlled_vehicles", 1) - len(env.controlled_vehicles)
+
+    def _seat_agents(self) -> None:
+        env, missing = self.env, self._missing_agents()
+        if missing <= 0:
+            return
+        vehicles, ego = env.road.vehicles, env.vehicle
+        # rewards make no sense for oncoming cars
+        places = [i for i, v in enumerate(vehicles) if isinstance(v, IDMVehicle) and v.direction @ ego.direction > 0.0]
+        if missing > len(places):
+            most = len(env.controlled_vehicles) + len(places)
+            raise ValueError(f"controlled_vehicles = {env.config['controlled_vehicles']}: expected at most {most}")
+        for i in places[:missing]:
+            car = vehicles[i]
+            agent = env.action_type.vehicle_class(env.road, car.position, car.heading, car.speed)
+            agent.target_lane_index, agent.route = car.target_lane_index, car.route
+            vehicles[i] = agent
+            env.controlled_vehicles = [*env.controlled_vehicles, agent]
+
+    # -- parameters of drivers
+
+    def _settle(self) -> None:
+        """Take them from the class, which the environment has just written them into."""
+        self.kind = class_from_path(self.env.config["other_vehicles_type"])
+        self.drivers = {name: getattr(self.kind, name) for name in ELSEWHERE if hasattr(self.kind, name)}
+        for vehicle in self.env.road.vehicles:
+            self._keep(vehicle)
+
+    def _keep(self, vehicle: Any) -> None:
+        """Give a vehicle what it would inherit from the class now."""
+        if not isinstance(vehicle, self.kind):
+            return
+        kinds = type(vehicle).__mro__
+        for name, value in self.drivers.items():
+            if not any(name in vars(kind) for kind in kinds[: kinds.index(self.kind)]):
+                vars(vehicle).setdefault(name, value)

@@ -11,7 +11,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.compliant import CompliantDriver, take_turns
 from envs.highway import LANES, Settings, ShieldedEgo
-from envs.shielding import attach
+from envs.shielding import attach, shield_on
 from shield.junction import PRIORITY
 from shield.plans import KNOWN
 
@@ -31,8 +31,16 @@ class RecklessVehicle(IDMVehicle):
     LANE_CHANGE_MAX_BRAKING_IMPOSED = math.inf  # [m/s^2]
 
 
-def shield_everybody(road: Any, drivers: list[ShieldedEgo], settings: Settings) -> list[ShieldedEgo]:
-    """Compliant traffic: a shield for every car that has none yet.
+def drivers_on(road: Any) -> list[ShieldedEgo]:
+    """Shields of the cars of compliant traffic, also of those that have left after a contact.
+
+    The road holds them, so that they are copied with their cars.
+    """
+    return getattr(road, "drivers", [])
+
+
+def shield_everybody(road: Any, settings: Settings) -> None:
+    """Compliant traffic: a shield for every car that has none yet, but for the ego's.
 
     Where everybody keeps their duties there are no crashes (Lemmas 5 and 6), apart from dangers that cars
     appear in. At junctions these drivers share their routes and take turns (`envs.compliant`); of anybody else they
@@ -42,17 +50,15 @@ def shield_everybody(road: Any, drivers: list[ShieldedEgo], settings: Settings) 
 
     Args:
       road: highway-env's road.
-      drivers: shields of all cars so far; those of cars that have left without a contact are dropped.
       settings: of the ego; its duties hold for everybody.
-
-    Returns:
-      Shields of all cars but those that had one before.
     """
     duties = settings._replace(overrides=True, entry=PRIORITY)
-    stay = [driver for driver in drivers if driver.contact or driver.vehicle in road.vehicles]
-    unshielded = [v for v in road.vehicles if isinstance(v, ControlledVehicle) and "act" not in vars(v)]
+    there = [v for v in road.vehicles if isinstance(v, ControlledVehicle) and v.collidable]
+    shields = [shield_on(v) for v in there]
+    stay = [driver for driver in drivers_on(road) if driver.contact or any(driver is one for one in shields)]
+    unshielded = [v for v, shield in zip(there, shields, strict=True) if shield is None]
     if settings.scheme == LANES:
-        return stay + [attach(vehicle, duties) for vehicle in unshielded]
-    new = [CompliantDriver(vehicle, duties._replace(intent=KNOWN)) for vehicle in unshielded]
+        road.drivers = stay + [attach(vehicle, duties) for vehicle in unshielded]
+        return
+    road.drivers = stay + [CompliantDriver(vehicle, duties._replace(intent=KNOWN)) for vehicle in unshielded]
     take_turns(road)
-    return stay + new

@@ -14,11 +14,13 @@ from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
 from highway_env.envs.u_turn_env import UTurnEnv
 
+from envs.egos import EgoShields
 from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
-from envs.risk import RiskFrame, RiskMeter, check_risk
-from envs.shielding import attach, audit_of, begin_step, end_step, info_of
+from envs.risk import RiskFrame, check_risk
+from envs.shielding import audit_of, begin_step, end_step, info_of
 from envs.signalised import SignalisedIntersectionEnv
-from envs.traffic import TRAFFIC, shield_everybody
+from envs.stock import check_frequencies
+from envs.traffic import TRAFFIC
 from shield.blame import Audit
 from shield.examined import EXAMINED
 from shield.junction import ENTRIES
@@ -40,7 +42,7 @@ _SCHEMES = {
 }
 
 
-class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
+class ShieldWrapper(EgoShields, RecordConstructorArgs):
     """Watches the ego on every simulation frame and says who is to blame at a contact.
 
     In mode "override" a command that RSS does not permit is replaced by the proper response; in
@@ -129,9 +131,9 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
             examine=examine,
             risk=risk,
         )
-        gym.Wrapper.__init__(self, env)
         check_options(mode, intervention_penalty, traffic)
         check_environment(env.unwrapped)
+        EgoShields.__init__(self, env)
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
@@ -140,11 +142,11 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         self.record = record
         self.traffic = traffic
         self.risk = check_risk(risk)
-        self._attach()
+        self._begin()
 
     @property
     def frames(self) -> list[Frame]:
-        """Recorded frames of this episode so far.
+        """Recorded frames of this episode so far, since the ego became the ego.
 
         Raises:
           ValueError: the wrapper was made without `record=True`.
@@ -172,29 +174,21 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         """
         return audit_of(self.frames, self.settings)
 
-    @property
-    def settings(self) -> Settings:
-        """The parameter table in force, response times rounded up to whole frames."""
-        return self._ego.settings
-
-    @property
-    def drivers(self) -> list[ShieldedEgo]:
-        """Shields of the other cars, in compliant traffic."""
-        return self._drivers
-
     def reset(self, *, seed=None, options=None):
-        observation, info = self.env.reset(seed=seed, options=options)
         env: Any = self.env.unwrapped
-        check_environment(env)
-        self._attach()
-        info.update(info_of(self._ego), time=float(env.time), **traffic_info(self))
+        check_frequencies(env.config | ((options or {}).get("config") or {}))
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._begin()
+        env = self.env.unwrapped
+        info.update(info_of(self._egos[0]), time=float(env.time), **traffic_info(self))
         return observation, info
 
     def step(self, action):
-        self._welcome()
-        had_contact = begin_step(self._ego)
+        egos = self._guard()
+        had_contact = begin_step(egos[0])
         observation, reward, terminated, truncated, info = self.env.step(action)
-        info.update(end_step(self._ego, had_contact, action), **traffic_info(self))
+        (ego,) = self._guard_after_step(egos)
+        info.update(end_step(ego, had_contact, action), **traffic_info(self))
         env: Any = self.env.unwrapped
         info.update(time=float(env.time), raw_reward=reward)
         if isinstance(env, IntersectionEnv):
@@ -202,20 +196,16 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
         return observation, reward, terminated, truncated, info
 
-    def _attach(self) -> None:
-        env: Any = self.env.unwrapped
-        settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
-        goal, among = env.config.get("destination"), self.traffic == "compliant"
-        self._ego = attach(env.vehicle, settings, self.record, goal, among)
-        self._ego.meter = RiskMeter(self.risk) if self.risk is not None else None
-        self._drivers: list[ShieldedEgo] = []
-        self._welcome()
+    @property
+    def _ego(self) -> ShieldedEgo:
+        """The shield on the ego, whichever vehicle that is now."""
+        return self._guard()[0]
 
-    def _welcome(self) -> None:
-        """Shield the cars that have come since the last step."""
-        if self.traffic == "compliant":
-            env: Any = self.env.unwrapped
-            self._drivers = shield_everybody(env.road, self._drivers, self.settings)
+    def _check(self) -> None:
+        check_environment(self.env.unwrapped)
+
+    def _current_settings(self) -> Settings:
+        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
 
 
 def traffic_info(wrapper) -> dict[str, Any]:
@@ -238,6 +228,7 @@ def check_options(mode: str, intervention_penalty: float, traffic: str) -> None:
 def check_environment(env: Any) -> None:
     """Can one ego be shielded in an environment?"""
     check_kind(env)
+    check_frequencies(env.config)
     if isinstance(env.action_type, MultiAgentAction):
         raise ValueError("action type MultiAgentAction is not supported by ShieldWrapper; expected MultiAgentShield")
     if len(env.controlled_vehicles) != 1:

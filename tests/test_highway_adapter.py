@@ -151,3 +151,85 @@ def test_the_lane_frame_of_a_merge_runs_through_all_its_segments():
     lane = network.get_lane(("k", "b", 0))
     x, y = lane.position(40.0, 0.0)
     assert abs(locate(ramp, x, y)[1]) < 0.05
+
+
+def place_ghost(road, distance, speed, kind=MDPVehicle):
+    """A road user ahead of the ego, on its lane, that nobody can touch."""
+    ego = road.vehicles[-1] if road.vehicles[-1].lane_index[0][0] == "o" else road.vehicles[0]
+    lane = ego.lane
+    s = lane.local_coordinates(ego.position)[0] + distance
+    ghost = kind(road, lane.position(s, 0.0), lane.heading_at(s), speed)
+    ghost.collidable = False
+    (road.objects if kind is Obstacle else road.vehicles).append(ghost)
+    return ghost
+
+
+@pytest.mark.parametrize("mode", ["override", "monitor"])
+@pytest.mark.parametrize(
+    ("env_id", "action", "distance", "speed", "kind", "config"),
+    [
+        ("highway-v0", 3, 60.0, 5.0, MDPVehicle, {"vehicles_count": 0, "lanes_count": 2}),
+        ("highway-fast-v0", 1, 15.0, 0.0, Vehicle, {"vehicles_count": 0, "lanes_count": 1}),
+        ("highway-fast-v0", 3, 40.0, 0.0, Obstacle, {"vehicles_count": 0, "lanes_count": 1}),
+        ("intersection-v0", 2, 14.0, 0.0, Vehicle, {"initial_vehicle_count": 0, "spawn_probability": 0.0}),
+    ],
+)
+def test_who_cannot_be_touched_does_not_count(env_id, action, distance, speed, kind, config, mode):
+    def told(ghosts):
+        env = make(env_id, shield=mode, config=config | {"duration": 8})
+        env.reset(seed=0)
+        if ghosts:
+            place_ghost(env.unwrapped.road, distance, speed, kind)
+        infos, done = [], False
+        while not done:
+            *_, terminated, truncated, info = env.step(action)
+            infos.append(
+                {name: info[name] for name in ("shield", "cost", "blame", "override_share", "min_ttc", "speed")}
+            )
+            done = terminated or truncated
+        assert info["blame"] == ""
+        return infos
+
+    assert told(ghosts=True) == told(ghosts=False)
+
+
+def test_a_car_that_becomes_touchable_counts_from_then_on():
+    road = straight_road(lanes=1)
+    ego = shielded(road)
+    ghost = place_ghost(road, 90.0, 5.0)
+    drive(road, 5)
+    assert ego.dangerous_pairs == 0
+    assert len(ego.others) == 0
+    ghost.collidable = True
+    drive(road, 60)
+    assert ego.dangerous_pairs > 0
+    assert not ego.vehicle.crashed
+
+
+def test_an_ego_that_nobody_can_touch_owes_nothing():
+    road = straight_road(lanes=1)
+    ego = shielded(road)
+    ego.vehicle.collidable = False
+    road.vehicles.append(Vehicle(road, [30.0, 0.0], speed=0.0))
+    drive(road, 60)
+    assert ego.dangerous_pairs == 0
+    assert ego.contact is None
+
+
+def test_in_compliant_traffic_a_car_that_cannot_be_touched_has_no_shield():
+    for env_id in ("highway-fast-v0", "intersection-v0"):
+        env = make(env_id, traffic="compliant")
+        env.reset(seed=0)
+        base = env.unwrapped
+        ghost = type(base.vehicle).create_from(base.vehicle)
+        ghost.collidable = False
+        base.road.vehicles.append(ghost)
+        env.step(1)
+        assert "act" not in vars(ghost)
+
+
+def test_a_flag_without_anybody_there_is_no_contact():
+    env = make("highway-v0", config={"vehicles_count": 0})
+    env.reset(seed=0)
+    env.unwrapped.vehicle.crashed = True
+    assert env.step(1)[4]["blame"] == ""

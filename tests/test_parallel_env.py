@@ -8,6 +8,18 @@ from envs.parallel import parallel_env
 
 KINDS = ["intersection-multi-agent-v0", "intersection-multi-agent-v1", "intersection-multi-agent-v2"]
 SLOWER, IDLE, FASTER = range(3)
+AGENTS = {
+    "controlled_vehicles": 3,
+    "action": {"type": "MultiAgentAction", "action_config": {"type": "DiscreteMetaAction"}},
+    "observation": {"type": "MultiAgentObservation", "observation_config": {"type": "Kinematics"}},
+}
+MOTORWAYS = [
+    ("highway-fast-v0", {"vehicles_count": 12}),
+    ("merge-v0", {}),
+    ("exit-v0", {"controlled_vehicles": 4}),
+    ("two-way-v0", {"controlled_vehicles": 2}),
+]
+LANE_LEFT, ON, LANE_RIGHT, FAST = range(4)
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*creation API has been deprecated.*:DeprecationWarning")
 
@@ -108,16 +120,14 @@ def test_actions_are_asked_of_exactly_the_agents_that_are_there():
         ("intersection-v0", {}, "env_id = 'intersection-v0' with shield = 'override': expected several agents"),
         (KINDS[0], {"shield": None}, "with shield = None: expected several agents"),
         ("nowhere-v0", {}, "env_id = 'nowhere-v0'"),
+        ("merge-v0", {"config": AGENTS | {"controlled_vehicles": 9}}, "controlled_vehicles = 9: expected at most 5"),
         (
             "highway-fast-v0",
             {
-                "config": {
-                    "controlled_vehicles": 2,
-                    "action": {"type": "MultiAgentAction", "action_config": {"type": "DiscreteMetaAction"}},
-                    "observation": {"type": "MultiAgentObservation", "observation_config": {"type": "Kinematics"}},
-                }
+                "config": AGENTS
+                | {"action": {"type": "MultiAgentAction", "action_config": {"type": "ContinuousAction"}}}
             },
-            "HighwayEnvFast does not say what each agent earns",
+            "ContinuousAction has no IDLE",
         ),
     ],
 )
@@ -132,3 +142,58 @@ def test_observations_are_those_of_each_agents_own_view():
     for agent, vehicle in zip(env.agents, env.env.unwrapped.controlled_vehicles, strict=True):
         x = float(observations[agent][0][1])
         assert x == pytest.approx(np.clip(vehicle.position[0] / 100, -1, 1), abs=1e-3)
+
+
+@pytest.mark.parametrize(("env_id", "config"), MOTORWAYS)
+@pytest.mark.filterwarnings("error::UserWarning")
+def test_a_motorway_passes_the_check_of_the_interface(env_id, config):
+    parallel_api_test(parallel_env(env_id, config=AGENTS | config | {"duration": 4}), num_cycles=6)
+
+
+@pytest.mark.parametrize(("env_id", "config"), MOTORWAYS)
+def test_on_a_motorway_each_agent_earns_what_it_would_as_the_only_one(env_id, config):
+    """The first agent's reward is the environment's own; so is any other's, once it is the first."""
+    env = parallel_env(env_id, shield="monitor", config=AGENTS | config)
+    for agent in range(AGENTS["controlled_vehicles"] - 1):
+        env.reset(seed=agent)
+        base = env.env.unwrapped
+        actions = dict(zip(env.agents, [LANE_LEFT, FAST, ON, LANE_RIGHT], strict=False))
+        for _ in range(2):
+            if len(env.agents) < len(env.possible_agents):
+                break
+            _, rewards, terminations, *_ = env.step(actions)
+        chosen = env.possible_agents[agent]
+        base.controlled_vehicles = [base.controlled_vehicles[agent]]
+        assert rewards[chosen] == base._reward(actions[chosen])
+        assert terminations[chosen] == base._is_terminated()
+
+
+def test_on_a_motorway_an_agent_that_has_crashed_leaves_and_the_others_go_on():
+    alone = 0
+    for seed in range(6):
+        env = parallel_env("highway-fast-v0", shield="monitor", config=AGENTS | {"vehicles_count": 20})
+        env.reset(seed=seed)
+        vehicles = dict(zip(env.possible_agents, env.env.unwrapped.controlled_vehicles, strict=True))
+        while env.agents:
+            playing = list(env.agents)
+            *_, terminations, truncations, infos = all_do(env, FAST)
+            for agent in playing:
+                assert terminations[agent] == vehicles[agent].crashed
+                assert (agent in env.agents) == (not vehicles[agent].crashed and not truncations[agent])
+                assert not terminations[agent] or infos[agent]["blame"]
+            alone += 0 < len(env.agents) < len(playing)
+    assert alone >= 3
+
+
+@pytest.mark.parametrize(("env_id", "config"), MOTORWAYS)
+def test_shielded_agents_on_a_motorway_are_never_to_blame(env_id, config):
+    env = parallel_env(env_id, config=AGENTS | config)
+    overridden = 0.0
+    for seed in range(3):
+        env.reset(seed=seed)
+        while env.agents:
+            *_, infos = all_do(env, FAST)
+            assert all(info["blame"] in ("", "other", "inherited") for info in infos.values())
+            assert all(info["episode_broken_duties"] == 0 for info in infos.values())
+            overridden += sum(info["shield"]["override_fraction"] for info in infos.values())
+    assert overridden > 0.0

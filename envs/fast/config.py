@@ -4,7 +4,6 @@ The stock environment is built once and asked for its configuration, roads and s
 default and every override means what it means there.
 """
 
-from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from highway_env.vehicle.kinematics import Vehicle
 
 from envs.fast.network import Network, compile_network
 from envs.fast.state import REWARDS
-from envs.stock import make_stock
+from envs.stock import AT_INTERSECTIONS, drivers_unchanged, make_stock
 
 HIGHWAY, MERGE, TWO_WAY, EXIT, ROUNDABOUT, INTERSECTION = range(6)
 KINEMATICS, TIME_TO_COLLISION = range(2)
@@ -187,8 +186,7 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
     asked = ((config or {}).get("action") or {}).get("type", "DiscreteMetaAction")
     if scenario in (MERGE, TWO_WAY, ROUNDABOUT) and asked != "DiscreteMetaAction":
         raise Unsupported(f"action type {asked} in {env_id}", "DiscreteMetaAction")  # nor does highway-env
-    with drivers_unchanged():
-        wrapped = make_stock(env_id, config=config)
+    wrapped = make_stock(env_id, config=config)
     env: Any = wrapped.unwrapped
     given = env.config
     _check(given)
@@ -236,18 +234,6 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
     )
 
 
-@contextmanager
-def drivers_unchanged():
-    """Undo what an `IntersectionEnv` does to the class of all traffic in the process."""
-    names = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
-    saved = {name: getattr(IDMVehicle, name) for name in names}
-    try:
-        yield
-    finally:
-        for name, value in saved.items():
-            setattr(IDMVehicle, name, value)
-
-
 def _check(given: dict) -> None:
     idm = "highway_env.vehicle.behavior.IDMVehicle"
     if given["other_vehicles_type"] != idm:
@@ -256,14 +242,12 @@ def _check(given: dict) -> None:
         raise Unsupported(f"controlled_vehicles = {given['controlled_vehicles']}", "1")
     if given["manual_control"]:
         raise Unsupported("manual_control = True", "False")
-    if given["simulation_frequency"] < given["policy_frequency"]:
-        raise Unsupported(f"simulation_frequency = {given['simulation_frequency']}", f">= {given['policy_frequency']}")
 
 
 def _fill_traffic(record) -> None:
-    # `IntersectionEnv` rewrites some of these attributes of the class for everybody; the values of
-    # the other environments are those that the class is defined with
-    record["comfort_acc_max"], record["comfort_acc_min"], record["distance_wanted"] = 3.0, -5.0, 10.0
+    with drivers_unchanged():
+        record["distance_wanted"] = IDMVehicle.DISTANCE_WANTED
+        record["comfort_acc_max"], record["comfort_acc_min"] = IDMVehicle.COMFORT_ACC_MAX, IDMVehicle.COMFORT_ACC_MIN
     record["acc_max"], record["time_wanted"] = IDMVehicle.ACC_MAX, IDMVehicle.TIME_WANTED
     record["min_acc_gain"] = IDMVehicle.LANE_CHANGE_MIN_ACC_GAIN
     record["max_braking_imposed"] = IDMVehicle.LANE_CHANGE_MAX_BRAKING_IMPOSED
@@ -353,7 +337,8 @@ def _fill_highway(record, given: dict, env, number: dict) -> tuple[str, ...]:
     record["offroad_terminal"] = given["offroad_terminal"]
     record["traffic"] = given["vehicles_count"]
     record["traffic_checks"] = env.road.vehicles[-1].check_collisions
-    record["ego_lane"] = -1 if given["initial_lane_id"] is None else given["initial_lane_id"]
+    asked = given["initial_lane_id"]  # as Python indexes a list: -1 is the last lane
+    record["ego_lane"] = -1 if asked is None else range(given["lanes_count"])[asked]
     record["ego_spacing"], record["traffic_spacing"] = given["ego_spacing"], 1 / given["vehicles_density"]
     record["lanes_factor"] = np.exp(-5 / 40 * given["lanes_count"])
     record["normalize_reward"] = given["normalize_reward"]
@@ -410,8 +395,8 @@ def _fill_roundabout(record, given: dict, env, number: dict) -> tuple[str, ...]:
 
 
 def _fill_intersection(record, given: dict, env, number: dict) -> tuple[str, ...]:
-    # what `IntersectionEnv` writes into the class of its traffic
-    record["distance_wanted"], record["comfort_acc_max"], record["comfort_acc_min"] = 7.0, 6.0, -3.0
+    for name, value in AT_INTERSECTIONS.items():
+        record[name.lower()] = value
     record["main_lane"] = number["o0", "ir0", 0]
     record["traffic"] = given["initial_vehicle_count"]
     record["offroad_terminal"] = given["offroad_terminal"]

@@ -141,8 +141,7 @@ def _restart(cars, episode, order, world, sight, distances, plans, watch, mode, 
     sort_along_x(cars, episode.cars, order)
     start_watch(episode, distances, plans, watch)
     start_tally(step)
-    rate(cars, episode, NO_ACTION, lanes, sight, config, step)
-    step.raw_reward = 0.0
+    step.raw_reward = rate(cars, episode, NO_ACTION, lanes, sight, config, step)
     _report(cars, episode, mode, 0.0, step)
     _see_apart(cars, episode, world, sight, out)
 

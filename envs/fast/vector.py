@@ -19,6 +19,10 @@ _MODES = {
 }
 
 
+# what a decision has and the beginning of an episode has not
+_OF_DECISIONS = ("raw_reward", "is_success", "proposed_action")
+
+
 class FastVectorEnv(VectorEnv):
     """E environments in the compiled engine, with the trajectories of highway-env.
 
@@ -35,8 +39,8 @@ class FastVectorEnv(VectorEnv):
       DISABLED: episodes are begun by `reset(options={"reset_mask": mask})`.
 
     Infos are dictionaries of arrays `[E]`; `info(e)` builds the dictionary of one environment. A
-    key "_name" marks where "name" is valid. `final_info["episode"]` holds return "r" and
-    length "l".
+    key "_name" marks where "name" is valid: `raw_reward` and `is_success` are not where an episode has just
+    begun, and `action` is 0 there. `final_info["episode"]` holds return "r" and length "l".
 
     Args:
       scenario: what to run.
@@ -69,6 +73,7 @@ class FastVectorEnv(VectorEnv):
         self.engine = Engine(scenario, num_envs, settings, intervention_penalty, _MODES[autoreset_mode], threads)
         self.recording = Recording(self.engine)
         self._everywhere = np.ones(num_envs, bool)
+        self._decided = np.zeros(num_envs, bool)  # not where the last call began an episode
         self._seeded = False
         self._infos: dict = {}
 
@@ -82,8 +87,9 @@ class FastVectorEnv(VectorEnv):
         outputs = self.engine.reset(mask)
         restarted = self._everywhere if mask is None else np.asarray(mask, bool)
         self.recording.begin(restarted)
-        self._infos = step_infos(outputs.steps, self.scenario, self.settings)
-        return self._shaped(outputs.observations), _marked(self._infos, restarted)
+        self._decided = np.zeros(self.num_envs, bool)
+        self._infos = self._told(outputs.steps, self._decided)
+        return self._shaped(outputs.observations), _marked(self._infos, restarted, self._decided)
 
     def step(self, actions):
         """One decision everywhere.
@@ -98,36 +104,45 @@ class FastVectorEnv(VectorEnv):
         began = self.engine.batch.episodes["ended"].copy()
         outputs = self.engine.step(discrete, commands)
         ended = outputs.terminated | outputs.truncated
-        same_step = self.engine.autoreset == SAME_STEP
-        self.recording.advance(ended, began if self.engine.autoreset == NEXT_STEP else None, same_step)
+        same_step, next_step = self.engine.autoreset == SAME_STEP, self.engine.autoreset == NEXT_STEP
+        self.recording.advance(ended, began if next_step else None, same_step)
 
-        self._infos = step_infos(outputs.steps, self.scenario, self.settings)
-        if self.settings is not None:
-            self._infos["shield"]["proposed_action"] = np.asarray(actions)
-        infos = _marked(self._infos, self._everywhere)
+        actions = np.asarray(actions)
+        self._decided = ~ended if same_step else ~began if next_step else self._everywhere
+        self._infos = self._told(outputs.steps, self._decided, actions)
+        infos = _marked(self._infos, self._everywhere, self._decided)
         if same_step and ended.any():
             infos |= self._finals(outputs, ended, actions)
         return self._shaped(outputs.observations), outputs.rewards, outputs.terminated, outputs.truncated, infos
 
     def info(self, e: int) -> dict:
         """The last infos of one environment as a plain dictionary."""
-        return info_of(self._infos, e)
+        info = info_of(self._infos, e)
+        return info if self._decided[e] else _without(info, _OF_DECISIONS)
 
     def close_extras(self, **kwargs) -> None:
         self.engine.close()
 
     def _finals(self, outputs: Outputs, ended, actions) -> dict:
-        finals = step_infos(outputs.final_steps, self.scenario, self.settings)
-        if self.settings is not None:
-            finals["shield"]["proposed_action"] = np.asarray(actions)
         steps = outputs.final_steps
+        finals = self._told(steps, ended, actions)
         finals["episode"] = {"r": steps["episode_return"], "l": steps["episode_length"]}
         return {
             "final_obs": self._shaped(outputs.final_observations),
             "_final_obs": ended,
-            "final_info": _marked(finals, ended),
+            "final_info": _marked(finals, ended, ended),
             "_final_info": ended,
         }
+
+    def _told(self, steps, decided, actions=None) -> dict:
+        """Infos, with the actions where one was decided upon."""
+        infos = step_infos(steps, self.scenario, self.settings)
+        if actions is None:
+            actions = np.zeros(self.action_space.shape, self.action_space.dtype)
+        infos["action"] = np.where(decided.reshape(-1, *[1] * (actions.ndim - 1)), actions, actions.dtype.type(0))
+        if self.settings is not None:
+            infos["shield"]["proposed_action"] = infos["action"]
+        return infos
 
     def _seeds(self, seed) -> list[int | None]:
         if seed is None:
@@ -157,10 +172,21 @@ class FastVectorEnv(VectorEnv):
         return observations.reshape(self.observation_space.shape)
 
 
-def _marked(infos: dict, where: np.ndarray) -> dict:
-    """Add the "_name" arrays that gymnasium expects."""
+def _marked(infos: dict, where: np.ndarray, decided: np.ndarray) -> dict:
+    """Add the "_name" arrays that gymnasium expects; what only decisions have is left out where there was none."""
     marked = {}
     for name, values in infos.items():
-        marked[name] = _marked(values, where) if isinstance(values, dict) else values
-        marked["_" + name] = where
+        valid = decided if name in _OF_DECISIONS else where
+        if valid is decided and not decided.any():
+            continue
+        marked[name] = _marked(values, where, decided) if isinstance(values, dict) else values
+        marked["_" + name] = valid
     return marked
+
+
+def _without(info: dict, names: tuple[str, ...]) -> dict:
+    return {
+        name: _without(value, names) if isinstance(value, dict) else value
+        for name, value in info.items()
+        if name not in names
+    }

@@ -6,11 +6,12 @@ import numpy as np
 from gymnasium import spaces
 
 import envs
-from envs.fast.config import compile_scenario, drivers_unchanged
+from envs.fast.config import compile_scenario
 from envs.fast.draws import generator_state
 from envs.fast.engine import DISABLED, Engine
 from envs.fast.infos import info_of, step_infos
 from envs.fast.state import OBSTACLE, TRAFFIC
+from envs.stock import drivers_unchanged
 
 _NEAREST = ("shield.partner", "shield.min_margin_lon", "shield.min_margin_lat")
 POLICIES = ("random", "faster", "slower")

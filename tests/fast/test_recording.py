@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import envs
-from envs.fast.config import drivers_unchanged
 from envs.fast.replay import read, show
+from envs.stock import drivers_unchanged
 
 ENV = "highway-fast-v0"
 

@@ -192,3 +192,84 @@ def test_continuous_actions_must_be_finite_and_of_the_right_shape(actions):
     env.reset(seed=0)
     with pytest.raises(ValueError, match="finite numbers"):
         env.step(np.array(actions, np.float32))
+
+
+@pytest.mark.parametrize(
+    ("lane", "lanes"), [(-1, 3), (-2, 4), (-3, 3), (0, 2), (3, 5), (None, 3)], ids=lambda value: str(value)
+)
+def test_both_backends_start_on_the_same_lane(lane, lanes):
+    config = {
+        "lanes_count": lanes,
+        "initial_lane_id": lane,
+        "observation": {"type": "Kinematics", "features": ["x", "y"], "absolute": True, "normalize": False},
+    }
+    fast, stock = (envs.make_vec(ENV, 2, shield=None, backend=b, config=config) for b in ("fast", "highway-env"))
+    for seed in range(3):
+        start = fast.reset(seed=seed)[0]
+        np.testing.assert_array_equal(start, stock.reset(seed=seed)[0])
+        if lane is not None:
+            assert (start[:, 0, 1] == 4.0 * (lane % lanes)).all()
+
+
+def _same_infos(ours, theirs, path="", reset=None):
+    """Keys, masks and values, but for what highway-env makes up at a reset and the wall clock."""
+    if path == ".blame_evidence":  # the engine's is always complete
+        ours = {name: ours[name] for name in theirs}
+    names = {name for name in ours if not name.startswith("_")}
+    assert names == {name for name in theirs if not name.startswith("_")} - (
+        {"t"} if path.endswith("episode") else set()
+    )
+    for name in names:
+        if isinstance(ours[name], dict):
+            _same_infos(ours[name], theirs[name], f"{path}.{name}", reset)
+            continue
+        where = theirs["_" + name] if path != ".blame_evidence" else theirs["_" + name] & ours["_" + name]
+        if path != ".blame_evidence":
+            assert np.array_equal(ours["_" + name], where), f"{path}.{name}"
+        for e in np.flatnonzero(where).tolist():
+            if name in ("action", "lane_change_reward") and reset[e]:
+                continue
+            a, b = ours[name][e], theirs[name][e]
+            assert np.allclose(a, b, atol=1e-6) if np.asarray(b).dtype.kind == "f" else np.all(a == b), f"{path}.{name}"
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize(
+    ("env_id", "shield", "config"),
+    [
+        (ENV, "monitor", {"duration": 4}),
+        (ENV, "override", {"duration": 3, "action": {"type": "ContinuousAction"}}),
+        ("intersection-v0", "monitor", {"duration": 4}),
+        ("intersection-v0", None, {"duration": 4}),
+        ("exit-v0", None, {"duration": 4}),
+        ("exit-v1", "monitor", {"duration": 4}),
+        ("merge-v0", "monitor", {"duration": 3}),
+        ("roundabout-v0", "override", {"duration": 3}),
+    ],
+)
+def test_both_backends_say_the_same(env_id, shield, config, mode):
+    fast, stock = (
+        envs.make_vec(env_id, 3, shield=shield, backend=b, config=config, autoreset_mode=mode)
+        for b in ("fast", "highway-env")
+    )
+    begins = np.ones(3, bool)
+    _same_infos(fast.reset(seed=1)[1], stock.reset(seed=1)[1], reset=begins)
+    fast.action_space.seed(0)
+    ended, steps = np.zeros(3, bool), 0
+    while steps < 9:
+        actions = fast.action_space.sample()
+        if mode == AutoresetMode.DISABLED and ended.any():
+            infos = [env.reset(options={"reset_mask": ended.copy()})[1] for env in (fast, stock)]
+            _same_infos(*infos, reset=begins)
+        *_, ours = fast.step(actions)
+        *_, terminated, truncated, theirs = stock.step(actions)
+        began, ended = ended, terminated | truncated
+        same_step = mode == AutoresetMode.SAME_STEP
+        now = ended if same_step else began if mode == AutoresetMode.NEXT_STEP else np.zeros(3, bool)
+        final = (ours.pop("final_info", {}), theirs.pop("final_info", {}))
+        for infos in (ours, theirs):
+            for name in ("final_obs", "episode"):
+                infos.pop(name, None)
+        _same_infos(ours, theirs, reset=now)
+        _same_infos(*final, reset=np.zeros(3, bool))
+        steps += 1
