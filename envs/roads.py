@@ -121,9 +121,10 @@ def _without_ends(found: dict[LaneIndex, _Stretch]) -> dict[LaneIndex, _Stretch]
     for lane, stretch in reversed(list(found.items())):
         if stretch.shift != 0.0 and not stretch.links and stretch.nearer is not None:
             bordering = found[stretch.nearer]
-            headings = [piece[HEADING] - bordering.pieces[-1][HEADING] for piece in bordering.pieces + stretch.pieces]
-            bent = any(piece[CURVATURE] for piece in bordering.pieces + stretch.pieces)
-            if not bent and np.abs(wrap_angle(np.array(headings))).max() < _ALIGNED and len(bordering.links) == 1:
+            pieces = bordering.pieces + stretch.pieces
+            headings = [abs(wrap_angle(piece[HEADING] - pieces[0][HEADING])) for piece in pieces]
+            bent = any(piece[CURVATURE] for piece in pieces)
+            if not bent and max(headings) < _ALIGNED and len(bordering.links) == 1:
                 found = {other: found[other] for other in found if other != lane}
                 found[stretch.nearer] = bordering._replace(links=[])
     return found
