@@ -238,7 +238,7 @@ class ShieldedEgo:
         """
         settings = self.settings
         rules = settings.ego, settings.other, settings.rules, settings.dt
-        ego_before, users_before = self.last
+        ego_before, users_before = self.last[0], self.last[1].copy()
         for i in np.flatnonzero(np.isfinite(users["around"])):
             around = users["around"][i]
             known = self.memory["age"][i] > 0 or self.memory["skipped"][i]
@@ -256,6 +256,7 @@ class ShieldedEgo:
                 users_before["s"][i] += places[place] - places[follows]
                 self.jumped[i] = True
                 forget_safe(self.memory[i])
+        self.last = (ego_before, users_before)
 
     def _meet(self) -> None:
         """Find out who is on the road, and where."""
@@ -304,12 +305,20 @@ class ShieldedEgo:
         self.heading, self.road, self.branches = heading, road, branches
         if jumps:
             self.jumped[:] = True
-            users, ego = self._measure(self.poses_before, self.earlier)
-            for flag in ("wreck", "in_own_lane"):
-                users[flag], ego[flag] = self.last[1][flag], self.last[0][flag]
-            self.last = (ego, users)
+            self.last = self._measure_again(*self.last)
             for memory in self.memory:
                 forget_safe(memory)
+
+    def _measure_again(self, ego_before, users_before):
+        """The ego and everybody else `[N]` on the frame before, in the lane frame of this one."""
+        users, ego = self._measure(self.poses_before, self.earlier)
+        for flag in ("wreck", "in_own_lane"):
+            users[flag], ego[flag] = users_before[flag], ego_before[flag]
+        closed = np.isfinite(users["around"])  # who was ahead is so still
+        around = users["around"][closed]
+        moved = (users_before["s"] - ego_before["s"] - users["s"] + ego["s"])[closed]
+        users["s"][closed] += around * np.round(moved / around)
+        return ego, users
 
     def _roads_along(self, heading: Heading):
         """The road that the ego is measured along, and the one with the branches that it may still take."""
