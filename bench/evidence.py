@@ -25,6 +25,7 @@ from gymnasium.vector import AutoresetMode
 from rich.console import Console
 from rich.table import Table
 
+import envs.random_roads
 from envs import make, make_vec
 from envs.traffic import RECKLESS
 from eval.files import atomic
@@ -123,6 +124,9 @@ def _cases() -> dict[str, Case]:
     for policy in ("continuous", "full-throttle"):
         cases[f"intersection-v1-{policy}"] = Case("intersection-v1", policy, 300, {})
         cases[f"intersection-v1-{policy}-known"] = Case("intersection-v1", policy, 300, {}, {"intent": "known"})
+    for kind in envs.random_roads.KINDS:
+        for policy in ("random", "faster"):
+            cases[f"{kind}-{policy}"] = Case("random-roads-v0", policy, 100, {"kind": kind})
     reckless = {"other_vehicles_type": RECKLESS}
     cases["reckless-random"] = Case("highway-fast-v0", "random", 200, reckless)
     cases["reckless-full-throttle"] = Case("highway-fast-v0", "full-throttle", 200, reckless | CONTINUOUS)

@@ -3,10 +3,10 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from highway_env.road.lane import CircularLane, SineLane, StraightLane
 from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 
+from envs.roads import Heading, heading_of, reach_of, road_through, tightest
 from shield.blame import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
 from shield.command import Command
 from shield.controller import (
@@ -20,18 +20,15 @@ from shield.controller import (
     respond,
 )
 from shield.examined import TABLE
-from shield.geometry import ARC_START, LENGTH, PIECE_FIELDS, largest_half_extents, make_road, wrap_angle
+from shield.geometry import PIECE_FIELDS, largest_half_extents
 from shield.junction import CAUTIOUS
-from shield.lane_frame import same_frame, to_lane_frame_all
-from shield.pair import ROAD_USER
+from shield.lane_frame import Bend, look_ahead, same_frame, to_lane_frame_all
+from shield.pair import ROAD_USER, assess
 from shield.params import RSSParams, Rules
 from shield.plans import ANY
 from shield.response import LAT, LON, MEMORY, catch_up, forget_safe
 
 MAX_SLIP = float(np.arctan(np.tan(ControlledVehicle.MAX_STEERING_ANGLE) / 2))  # of a car's centre [rad]
-_JOIN = 0.5  # lane ends closer than this belong together [m]
-_CHAIN = 8  # lanes followed in either direction
-_SAMPLE = 2.0  # spacing of the pieces that stand in for a curve of changing curvature [m]
 
 AXES = {0: "inherited", LON: "longitudinal", LAT: "lateral", LON | LAT: "both"}
 # of a car that had its contact before there was a shield on it
@@ -73,18 +70,21 @@ class Frame(NamedTuple):
     # in the lane frame of the ego, which nothing is measured in where roads cross
     ego: np.ndarray | None = None  # `ROAD_USER`, 0-d
     users: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` `ROAD_USER`
-    curvature: float = 0.0  # of the lane at the ego [1/m]
-    jumped: bool = False  # the lane frame moved everybody at once on this frame
+    curvature: float = 0.0  # of the lane under the ego [1/m]
+    jumped: tuple[bool, ...] = ()  # `[N]` a user was moved in the lane frame, or with it
+    ego_before: np.ndarray | None = None  # `ROAD_USER` on the frame before, in the lane frame of this one
+    users_before: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` likewise
 
 
 def log_of(frames: list[Frame]) -> Log:
     """Recorded frames as the arrays that `shield.blame.audit` reads."""
     count = 1 + max((max(frame.keys, default=-1) for frame in frames), default=-1)
-    users = np.zeros((len(frames), count), ROAD_USER)
-    present = np.zeros((len(frames), count), bool)
+    users, before = np.zeros((2, len(frames), count), ROAD_USER)
+    present, jumped = np.zeros((2, len(frames), count), bool)
     for t, frame in enumerate(frames):
-        users[t, list(frame.keys)] = frame.users
-        present[t, list(frame.keys)] = True
+        keys = list(frame.keys)
+        users[t, keys], before[t, keys] = frame.users, frame.users_before
+        present[t, keys], jumped[t, keys] = True, frame.jumped
     return Log(
         ego=np.array([frame.ego for frame in frames], ROAD_USER),
         users=users,
@@ -92,74 +92,10 @@ def log_of(frames: list[Frame]) -> Log:
         acceleration=np.array([frame.command.acceleration for frame in frames]),
         slip=np.array([frame.command.slip for frame in frames]),
         curvature=np.array([frame.curvature for frame in frames], float),
-        jumped=np.array([frame.jumped for frame in frames], bool),
+        jumped=jumped,
+        ego_before=np.array([frame.ego_before for frame in frames], ROAD_USER),
+        users_before=before,
     )
-
-
-# ---------------------------------------------------------------- roads
-
-
-def _pieces_of(lane) -> list[tuple[float, ...]]:
-    """Pieces of constant curvature of one lane: start x, y, heading, curvature, length."""
-    if isinstance(lane, StraightLane) and not isinstance(lane, SineLane):
-        (x, y), heading = lane.position(0.0, 0.0), lane.heading_at(0.0)
-        return [(x, y, heading, 0.0, lane.length)]
-    if isinstance(lane, CircularLane):
-        (x, y), heading = lane.position(0.0, 0.0), lane.heading_at(0.0)
-        curvature = (1.0 if lane.clockwise else -1.0) / lane.radius
-        return [(x, y, heading, curvature, lane.length)]
-    corners = np.array([lane.position(s, 0.0) for s in np.linspace(0.0, lane.length, int(lane.length // _SAMPLE) + 2)])
-    steps = np.diff(corners, axis=0)
-    return [
-        (x, y, np.arctan2(dy, dx), 0.0, np.hypot(dx, dy)) for (x, y), (dx, dy) in zip(corners[:-1], steps, strict=True)
-    ]
-
-
-def _joined(first, second) -> bool:
-    end, start = first.position(first.length, 0.0), second.position(0.0, 0.0)
-    turn = wrap_angle(first.heading_at(first.length) - second.heading_at(0.0))
-    return bool(np.hypot(*(end - start)) < _JOIN and abs(turn) < np.pi / 4)
-
-
-def _neighbour(network, index, forward: bool):
-    """Lane that continues `index` without a jump, or None."""
-    lane = network.get_lane(index)
-    for origin, ends in network.graph.items():
-        for end, lanes in ends.items():
-            if (origin if forward else end) == (index[1] if forward else index[0]):
-                for i, other in enumerate(lanes):
-                    if _joined(lane, other) if forward else _joined(other, lane):
-                        return origin, end, i
-    return None
-
-
-def chain_through(network, index) -> list[tuple]:
-    """Lanes along the road of a lane: what leads to it, itself, and what follows."""
-    chain = [index]
-    for forward in (False, True):
-        for _ in range(_CHAIN):
-            found = _neighbour(network, chain[-1] if forward else chain[0], forward)
-            if found is None or found in chain:
-                break
-            chain = [*chain, found] if forward else [found, *chain]
-    return chain
-
-
-def road_through(network, index) -> np.ndarray:
-    """The road along a lane (`chain_through`) as `[K, 8]` pieces.
-
-    Arc length counts from the start of the lane `index`.
-    """
-    rows, start, offset = [], 0.0, 0.0
-    for lane_index in chain_through(network, index):
-        if lane_index == index:
-            offset = start
-        for piece in _pieces_of(network.get_lane(lane_index)):
-            rows.append((*piece, start))
-            start += piece[LENGTH]
-    road = make_road(rows)
-    road[:, ARC_START] -= offset
-    return road
 
 
 # ---------------------------------------------------------------- one ego under the shield
@@ -197,13 +133,16 @@ class ShieldedEgo:
         self.seen = 0
         self.memory = np.zeros(0, MEMORY)
         self.poses = np.zeros((0, 4))
-        self.before = np.zeros((0, 2))
+        self.poses_before = np.zeros((0, 4))  # one frame ago
+        self.before = np.zeros((0, 2))  # positions one frame before `poses`
+        self.earlier = np.zeros((0, 2))  # and before `poses_before`
         self.boxes = np.zeros((0, 4))
         self.last = (np.zeros(1, ROAD_USER)[0], np.zeros(0, ROAD_USER))  # ego and others on the frame before
         self.roads: dict = {}
-        self.lane_index: tuple | None = None
-        self.road = np.zeros((0, PIECE_FIELDS))
-        self.jumped = False
+        self.heading: Heading | None = None
+        self.road = np.zeros((0, PIECE_FIELDS))  # that the ego is measured along
+        self.branches = self.road  # and everybody else
+        self.jumped = np.zeros(0, bool)
         self.contact: dict | None = None
         self.frames = self.frames_overridden = 0
         self.dangerous_pairs = self.broken_duties = 0
@@ -238,16 +177,16 @@ class ShieldedEgo:
         nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
         steering = float(nominal["steering"])  # single precision where the agent's action is
         self._meet()
-        users, ego, curvature = self._sense()
+        users, ego, bend = self._sense()
         wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
         rules = settings.ego, settings.other, settings.rules, settings.dt
         danger = find_danger(ego, users, *self.last, self.memory, *rules)
         response = Response(wish, False, False)
         if settings.overrides:
-            response = respond(wish, danger, ego, Body(*self.body, curvature), settings.rules, settings.dt)
+            response = respond(wish, danger, ego, Body(*self.body, *bend), settings.rules, settings.dt)
         command = response.command
         pairs, broken = judge_frame(
-            ego, users, self.memory, command, curvature, settings.ego, settings.other, settings.dt
+            ego, users, self.memory, command, bend.curvature, settings.ego, settings.other, settings.dt
         )
         steered = steering
         if command != wish:
@@ -256,14 +195,15 @@ class ShieldedEgo:
             vehicle.action = {"steering": steered, "acceleration": command.acceleration}
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
-        self.last = (ego, users)
+        before, self.last = self.last, (ego, users)
         self._count(danger, response, pairs, broken, command.acceleration - wish.acceleration, steered - steering)
         tally = self.tally
         if max(danger.margin_lon, danger.margin_lat) < max(tally.margin_lon, tally.margin_lat):
             tally.margin_lon, tally.margin_lat = danger.margin_lon, danger.margin_lat
             tally.partner = self._index_on_road(danger.partner)
         if self.record is not None:
-            self.record.append(Frame(tuple(self.keys), self.poses, command, ego, users, curvature, self.jumped))
+            seen = ego, users, bend.curvature, tuple(self.jumped), *before
+            self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
 
     def _count(
         self, danger, response, pairs: int, broken: int, acceleration_change: float, steering_change: float
@@ -292,15 +232,52 @@ class ShieldedEgo:
     # -- reading the road
 
     def _sense(self):
-        """Everybody else `[N]` and the ego as `ROAD_USER` records in the lane frame of the ego."""
+        """Everybody else `[N]` and the ego as `ROAD_USER` records in the lane frame of the ego, and its `Bend`."""
         self._choose_frame()
-        others = self.others
-        out = np.zeros(len(others) + 1, ROAD_USER)
-        out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in others]
-        out["in_own_lane"] = [self._in_own_lane(v) for v in [*others, self.vehicle]]
-        curvature = to_lane_frame_all(self.road, self.poses, self.before, self.boxes, self.settings.dt, out)
-        self.before = self.poses[:, :2]
-        return out[:-1], out[-1], curvature
+        users, ego = self._measure(self.poses, self.before)
+        self._go_around(users, ego)
+        (x, y, _, speed), dt = self.poses[-1], self.settings.dt
+        bend = look_ahead(self.road, x, y, speed, self.body[0], dt)
+        self.poses_before, self.earlier, self.before = self.poses, self.before, self.poses[:, :2]
+        return users, ego, Bend(*bend)
+
+    def _measure(self, poses, before):
+        """Everybody else `[N]` and the ego as `ROAD_USER` records."""
+        out = np.zeros(len(poses), ROAD_USER)
+        out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in self.others]
+        out["in_own_lane"] = [self._in_own_lane(v) for v in [*self.others, self.vehicle]]
+        dt = self.settings.dt
+        to_lane_frame_all(self.branches, poses[:-1], before[:-1], self.boxes[:-1], dt, out[:-1])
+        to_lane_frame_all(self.road, poses[-1:], before[-1:], self.boxes[-1:], dt, out[-1:])
+        return out[:-1], out[-1]
+
+    def _go_around(self, users, ego) -> None:
+        """On a closed road everybody is ahead and behind: count where the margin is smaller, unless danger lasts.
+
+        In danger who was ahead stays ahead. Where somebody changes places otherwise, the sample before is taken
+        in again from there.
+        """
+        settings = self.settings
+        rules = settings.ego, settings.other, settings.rules, settings.dt
+        ego_before, users_before = self.last[0], self.last[1].copy()
+        for i in np.flatnonzero(np.isfinite(users["around"])):
+            around = users["around"][i]
+            known = self.memory["age"][i] > 0 or self.memory["skipped"][i]
+            gap = users_before["s"][i] - ego_before["s"] if known else 0.0
+            places = ego["s"] + (users["s"][i] - ego["s"]) % around - [0.0, around]
+            follows = int(np.argmin(np.abs(places - ego["s"] - gap)))
+            place = follows
+            if self.memory["since"][i] == 0:
+                margins = []
+                for users["s"][i] in places:
+                    margins.append(assess(ego, users[i], *rules).margin_lon)
+                place = int(np.argmin(margins))
+            users["s"][i] = places[place]
+            if place != follows and known:
+                users_before["s"][i] += places[place] - places[follows]
+                self.jumped[i] = True
+                forget_safe(self.memory[i])
+        self.last = (ego_before, users_before)
 
     def _meet(self) -> None:
         """Find out who is on the road, and where."""
@@ -317,7 +294,7 @@ class ShieldedEgo:
         """Carry the memory over to a new set of road users, by identity."""
         old = {id(other): i for i, other in enumerate(self.others)}
         memory = np.zeros(len(others), MEMORY)
-        before = np.full((len(others) + 1, 2), np.nan)
+        poses, before, earlier = (np.full((len(others) + 1, width), np.nan) for width in (4, 2, 2))
         last = np.zeros(len(others), ROAD_USER)
         keys = []
         for i, other in enumerate(others):
@@ -326,28 +303,51 @@ class ShieldedEgo:
                 keys.append(self.seen)
                 self.seen += 1
             else:
-                memory[i], before[i], last[i] = self.memory[k], self.before[k], self.last[1][k]
+                memory[i], last[i] = self.memory[k], self.last[1][k]
+                poses[i], before[i], earlier[i] = self.poses_before[k], self.before[k], self.earlier[k]
                 keys.append(self.keys[k])
         if len(self.before):
-            before[-1] = self.before[-1]
-        self.others, self.memory, self.before, self.keys = others, memory, before, keys
+            poses[-1], before[-1], earlier[-1] = self.poses_before[-1], self.before[-1], self.earlier[-1]
+        self.others, self.memory, self.keys = others, memory, keys
+        self.poses_before, self.before, self.earlier = poses, before, earlier
         self.last = (self.last[0], last)
-        self.boxes = np.array([_box(v, self.settings.rules.heading_bound) for v in [*others, self.vehicle]])
+        bound, bend = self.settings.rules.heading_bound, tightest(self.vehicle.road.network)
+        self.boxes = np.array([_box(v, bound, bend) for v in [*others, self.vehicle]])
 
     def _choose_frame(self) -> None:
-        """Measure along the lane the ego is on. Where that moves everybody at once, danger is not their doing."""
-        self.jumped = False
-        index = self.vehicle.lane_index
-        if index == self.lane_index:
+        """Measure along the road that the ego drives. Where that jumps, so does the sample before."""
+        self.jumped = np.zeros(len(self.others), bool)
+        heading = heading_of(self.vehicle)
+        if heading == self.heading:
             return
-        if index not in self.roads:
-            self.roads[index] = road_through(self.vehicle.road.network, index)
-        road = self.roads[index]
-        if self.lane_index is not None and not same_frame(self.road, road):
-            self.jumped = True
+        if heading not in self.roads:
+            self.roads[heading] = self._roads_along(heading)
+        road, branches = self.roads[heading]
+        jumps = self.heading is not None and not (same_frame(self.road, road) and same_frame(self.branches, branches))
+        self.heading, self.road, self.branches = heading, road, branches
+        if jumps:
+            self.jumped[:] = True
+            self.last = self._measure_again(*self.last)
             for memory in self.memory:
                 forget_safe(memory)
-        self.lane_index, self.road = index, road
+
+    def _measure_again(self, ego_before, users_before):
+        """The ego and everybody else `[N]` on the frame before, in the lane frame of this one."""
+        users, ego = self._measure(self.poses_before, self.earlier)
+        for flag in ("wreck", "in_own_lane"):
+            users[flag], ego[flag] = users_before[flag], ego_before[flag]
+        closed = np.isfinite(users["around"])  # who was ahead is so still
+        around = users["around"][closed]
+        moved = (users_before["s"] - ego_before["s"] - users["s"] + ego["s"])[closed]
+        users["s"][closed] += around * np.round(moved / around)
+        return ego, users
+
+    def _roads_along(self, heading: Heading):
+        """The road that the ego is measured along, and the one with the branches that it may still take."""
+        settings, network = self.settings, self.vehicle.road.network
+        reach = reach_of(settings.ego, settings.other, settings.dt)
+        road = road_through(network, heading.lane, reach, heading.way)
+        return road, road_through(network, heading.lane, reach, *heading[1:]) if heading.beside else road
 
     def _in_own_lane(self, other) -> bool:
         """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
@@ -415,9 +415,12 @@ class ShieldedEgo:
         return bool(touching or will_touch)
 
 
-def _box(user, heading_bound: float) -> tuple[float, float, float, float]:
-    """Length and width, and the largest half extents that its driver may use; obstacles have no driver [m]."""
-    bound = heading_bound if hasattr(user, "action") else 1.0
+def _box(user, heading_bound: float, curvature: float) -> tuple[float, float, float, float]:
+    """Length and width, and the largest half extents that its driver may use; obstacles have no driver [m].
+
+    In a tight bend a car that keeps to its lane is at a larger angle to it than the bound.
+    """
+    bound = max(heading_bound, min(curvature * user.LENGTH / 2, 0.9)) if hasattr(user, "action") else 1.0
     return user.LENGTH, user.WIDTH, *largest_half_extents(user.LENGTH, user.WIDTH, bound)
 
 

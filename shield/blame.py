@@ -29,6 +29,7 @@ from shield.response import (
     LON,
     MEMORY,
     NEVER,
+    catch_up,
     forget_safe,
     lateral_speed_limit,
     longitudinal_response,
@@ -224,7 +225,7 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
     Args:
       ego, users, memory: as in `find_danger`; the verdict so far is kept in `memory`.
       command: `Command` that the ego executes on this frame.
-      curvature: of the lane at the ego [1/m].
+      curvature: of the lane under the ego, see `shield.lane_frame.Bend` [1/m].
       ego_params, other_params, dt: as in `find_danger`.
       who: as in `find_danger`; nobody else may be in danger.
 
@@ -303,8 +304,10 @@ class Log(NamedTuple):
     present: np.ndarray  # `[T, N]` bool; absent users are masked
     acceleration: np.ndarray  # `[T]` executed by the ego [m/s^2]
     slip: np.ndarray  # `[T]` [rad]
-    curvature: np.ndarray  # `[T]` of the lane at the ego [1/m]
-    jumped: np.ndarray  # `[T]` bool: the lane frame moved everybody at once on this frame
+    curvature: np.ndarray  # `[T]` of the lane under the ego [1/m]
+    jumped: np.ndarray  # `[T, N]` bool: the lane frame jumped on this frame, or the user around a ring in it
+    ego_before: np.ndarray  # `[T]` `ROAD_USER` on the frame before, in this frame's lane frame; read where it jumped
+    users_before: np.ndarray  # `[T, N]` likewise
 
 
 class Audit(NamedTuple):
@@ -340,8 +343,9 @@ def audit(log, ego_params, other_params, rules, dt):
         for i in range(count):
             if not log.present[t, i]:
                 continue
-            if log.jumped[t]:
+            if log.jumped[t, i]:
                 forget_safe(memory[i])
+            catch_up(memory[i], log.ego_before[t], log.users_before[t, i], ego_params, other_params, rules, dt)
             pair = assess(ego, log.users[t, i], ego_params, other_params, rules, dt)
             remember(memory[i], pair, ego, log.users[t, i], dt)
             if memory[i].since > 0:

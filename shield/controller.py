@@ -9,6 +9,7 @@ from shield.command import Command
 from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
 from shield.kinematics import time_to_collision
+from shield.lane_frame import beyond
 from shield.pair import assess, leading_speed, least_cosine, least_margin, own_share, toward
 from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, owes_no_approach, remember
 
@@ -47,7 +48,8 @@ class Body(NamedTuple):
 
     half_wheelbase: float  # distance from the centre to the rear axle [m]
     max_slip: float  # largest slip angle the steering reaches [rad]
-    curvature: float  # of the lane at the ego, positive turns right [1/m]
+    curvature: float  # of the lane under the ego, see `shield.lane_frame.Bend` [1/m]
+    slack: float = 0.0  # likewise [rad]
 
 
 @compiled
@@ -207,7 +209,8 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     turned = body.curvature * v * dt  # the lane turns under the car during the frame ...
     drift = 0.5 * turned * v  # ... and curves away from its tangent [m/s]
     psi_next = psi + gain * np.sin(slip) - turned
-    if _is_permitted(psi + slip, psi_next, v, v_next, drift, bounds, rules) and abs(slip) <= body.max_slip:
+    permitted = _is_permitted(psi + slip, psi_next, body.slack, v, v_next, drift, bounds, rules)
+    if permitted and abs(slip) <= body.max_slip:
         return slip
     neutral = _straightening_slip(psi, turned, drift, gain, v, bounds)
 
@@ -215,7 +218,8 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     low = min(_arcsin((-bounds.left + drift) / v) - psi, neutral)
     high = max(_arcsin((bounds.right + drift) / v) - psi, neutral)
     # heading after this frame, by the speed it commits to and by the heading bound
-    psi_low, psi_high = _arcsin(-bounds.left_next / v_next), _arcsin(bounds.right_next / v_next)
+    psi_low = _arcsin(-bounds.left_next / v_next) + min(body.slack, 0.0)
+    psi_high = _arcsin(bounds.right_next / v_next) + max(body.slack, 0.0)
     if rules.heading_bound < 1.0:
         # the course, slip included, keeps the bound too: a leader's way along the lane relies on it
         largest = np.arcsin(rules.heading_bound)
@@ -228,15 +232,15 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
 
 
 @inner
-def _is_permitted(course, psi_next, v, v_next, drift, bounds, rules):
+def _is_permitted(course, psi_next, slack, v, v_next, drift, bounds, rules):
     """Do course and next heading [rad] keep all bounds? The bounds in closed form, without solving for the slip."""
     if abs(course) >= _STEEP or abs(psi_next) >= _STEEP:
         return False
-    sin, sin_next = np.sin(course), np.sin(psi_next)
+    sin, sin_next, sin_committed = np.sin(course), np.sin(psi_next), np.sin(beyond(psi_next, slack))
     steepest = rules.heading_bound
     return (
         -bounds.left <= v * sin - drift <= bounds.right
-        and -bounds.left_next <= v_next * sin_next <= bounds.right_next
+        and -bounds.left_next <= v_next * sin_committed <= bounds.right_next
         and abs(sin) <= steepest
         and abs(sin_next) <= steepest
     )
@@ -247,12 +251,13 @@ def _straightening_slip(psi, turned, drift, gain, v, bounds):
     """Slip that ends the sideways motion [rad].
 
     For G <= 1 the lateral speed itself is set to 0 and the heading follows by the factor 1 - G.
-    Beyond, the heading is set straight, and the lateral speed shrinks by 1 - 1/G on the way. While
+    Beyond, the heading is set as the lane asks, and the lateral speed shrinks by 1 - 1/G on the way. While
     G < 2 the heading still calms down by itself, and the lateral speed keeps its bound first.
     """
     if gain <= 1.0:
         return _arcsin(drift / v) - psi
-    slip = _arcsin((turned - psi) / gain)
+    along = _arcsin(drift / v) - _arcsin(turned / gain)  # heading of a car that keeps to the bend
+    slip = _arcsin((turned - psi + along) / gain)
     if gain < 2.0:
         u = v * np.sin(psi + slip) - drift
         slip = _arcsin((min(max(u, -bounds.left), bounds.right) + drift) / v) - psi

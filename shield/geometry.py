@@ -1,23 +1,34 @@
 """Lane frames and oriented boxes (Section 3.2 of the paper, metric lateral coordinates).
 
-A road is a chain of pieces of constant curvature, `[K, 8]` float64, one row per piece:
-start x, start y, start heading, curvature (positive turns right), length, arc length at the start,
-cosine and sine of the start heading. y points to the right of the driving direction.
+A road is made of pieces of constant curvature, `[K, 11]` float64, one row per piece: start x, start y,
+start heading, curvature (positive turns right), length, arc length at the start, cosine and sine of the
+start heading, the rows before and after it, and the way round. y points to the right of the driving
+direction.
+
+Most roads are chains. Where a road forks several rows have the same one before them, where roads merge
+several have the same one after them. At a `FREE` end the road goes on straight; at a `CUT` one it goes on
+in a way that is too far off to matter. Where a road closes on itself each piece lies ahead as well as
+behind: its arc length is the one ahead, and less by the way round (inf where there is none) behind.
 """
 
 import numpy as np
 
 from shield.compiled import compiled, inner, rare
 
-PIECE_FIELDS = 8
-X, Y, HEADING, CURVATURE, LENGTH, ARC_START, COS, SIN = range(PIECE_FIELDS)
+PIECE_FIELDS = 11
+X, Y, HEADING, CURVATURE, LENGTH, ARC_START, COS, SIN, BEFORE, AFTER, AROUND = range(PIECE_FIELDS)
+FREE, CUT = -1, -2  # what ends of a road have instead of a row before or after them
 _STRAIGHT = 1e-9  # curvature below which a piece is straight [1/m]
 
 
 def make_road(pieces) -> np.ndarray:
-    """A road `[K, 8]` from the first six columns of its pieces."""
+    """A chain `[K, 11]` from the first six columns of its pieces, with free ends."""
     rows = np.asarray(pieces, dtype=float).reshape(-1, COS)
-    return np.column_stack([rows, np.cos(rows[:, HEADING]), np.sin(rows[:, HEADING])])
+    order = np.arange(float(len(rows)))
+    before = np.where(order > 0, order - 1, FREE)
+    after = np.where(order < len(rows) - 1, order + 1, FREE)
+    around = np.full(len(rows), np.inf)
+    return np.column_stack([rows, np.cos(rows[:, HEADING]), np.sin(rows[:, HEADING]), before, after, around])
 
 
 @compiled
@@ -49,7 +60,7 @@ def locate(road, x, y):
     The piece whose lane is nearest counts; beyond both ends of the chain the road goes on straight.
 
     Args:
-      road: `[K, 8]` pieces.
+      road: `[K, 11]` pieces.
       x, y: position [m].
 
     Returns:
@@ -57,18 +68,20 @@ def locate(road, x, y):
       [rad] and its curvature [1/m] there.
     """
     s, lateral, k, heading = nearest_piece(road, x, y)
-    return s, lateral, heading, road[k, CURVATURE] if k >= 0 else 0.0
+    along = s - road[k, ARC_START]
+    beyond = (along < 0.0 and road[k, BEFORE] == FREE) or (along > road[k, LENGTH] and road[k, AFTER] == FREE)
+    return s, lateral, heading, 0.0 if beyond else road[k, CURVATURE]
 
 
 @compiled
 def is_straight(road):
-    """Is a road `[K, 8]` one straight piece?"""
+    """Is a road `[K, 11]` one straight piece?"""
     return len(road) == 1 and abs(road[0, CURVATURE]) < _STRAIGHT
 
 
 @compiled
 def nearest_piece(road, x, y):
-    """As `locate`, but with the index of the piece; -1 on the tangent beyond a curved end."""
+    """As `locate`, but with the row of the piece."""
     if is_straight(road):
         s, lateral, heading = _on_piece(road[0], x, y)
         return road[0, ARC_START] + s, lateral, 0, heading
@@ -79,22 +92,58 @@ def nearest_piece(road, x, y):
 def _search(road, x, y):
     """`nearest_piece` on any road. Motorways are straight; where roads wind, a call costs little beside the rest."""
     best = np.inf
-    s_best, y_best, heading_best, k_best = 0.0, 0.0, 0.0, -1
-    last = len(road) - 1
-    for k in range(last + 1):
-        piece, nearest = road[k], k
-        s, lateral, heading = _on_piece(piece, x, y)
-        before, after = s < 0.0, s > piece[LENGTH]
-        outside = -s if before else (s - piece[LENGTH] if after else 0.0)
-        free_end = (before and k == 0) or (after and k == last)
-        if free_end and abs(piece[CURVATURE]) >= _STRAIGHT:
-            s, lateral, heading = _on_tangent(piece, x, y, after)
-            nearest = -1
-        distance = abs(lateral) + (0.0 if free_end else outside)
+    s_best, y_best, heading_best, k_best = 0.0, 0.0, 0.0, 0
+    for k in range(len(road)):
+        s, lateral, heading, outside = _beside(road[k], x, y)
+        distance = abs(lateral) + outside
         if distance < best:
             best = distance
-            s_best, y_best, heading_best, k_best = piece[ARC_START] + s, lateral, heading, nearest
+            s_best, y_best, heading_best, k_best = road[k, ARC_START] + s, lateral, heading, k
     return s_best, y_best, k_best, heading_best
+
+
+@inner
+def _beside(piece, x, y):
+    """`_on_piece`, straight on beyond a free end, and how far beyond any other end the point is [m]."""
+    s, lateral, heading = _on_piece(piece, x, y)
+    before, after = s < 0.0, s > piece[LENGTH]
+    if (before and piece[BEFORE] == FREE) or (after and piece[AFTER] == FREE):
+        if abs(piece[CURVATURE]) >= _STRAIGHT:
+            s, lateral, heading = _on_tangent(piece, x, y, after)
+        return s, lateral, heading, 0.0
+    return s, lateral, heading, -s if before else (s - piece[LENGTH] if after else 0.0)
+
+
+@rare
+def follow(road, k, x, y):
+    """Lateral offset [m] and heading of the lane [rad] at a point a moment's drive from the piece `k`.
+
+    Where other pieces are nearer to the point those do not count: the point is on the same way as the piece.
+    """
+    s, lateral, heading, outside = _beside(road[k], x, y)
+    forward = s > 0.0
+    for _ in range(len(road)):
+        if outside == 0.0 or (s > 0.0) != forward:
+            break
+        following = _next_row(road, k, x, y, forward)
+        if following < 0:
+            break
+        k = following
+        s, lateral, heading, outside = _beside(road[k], x, y)
+    return lateral, heading
+
+
+@inner
+def _next_row(road, k, x, y, forward):
+    """The piece after (or before) piece `k` that is nearest to a point; -1 if there is none."""
+    there, back = (AFTER, BEFORE) if forward else (BEFORE, AFTER)
+    best, nearest = np.inf, -1
+    for i in range(len(road)):
+        if i == road[k, there] or road[i, back] == k:
+            _, lateral, _, outside = _beside(road[i], x, y)
+            if abs(lateral) + outside < best:
+                best, nearest = abs(lateral) + outside, i
+    return nearest
 
 
 @inner

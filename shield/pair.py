@@ -17,10 +17,11 @@ ROAD_USER = np.dtype(
         ("y", "f8"),  # lateral offset of the centre
         ("heading", "f8"),  # relative to the lane
         ("cos", "f8"),  # of the heading
-        ("sin", "f8"),
+        ("sin", "f8"),  # less what the bend of the lane explains of a car that keeps to it
         ("speed", "f8"),  # along its own heading, negative in reverse
         ("along", "f8"),  # speed along the lane over the last frame, slip included
-        ("u", "f8"),  # speed across the lane over the last frame
+        ("u", "f8"),  # speed across the lane over the last frame: what `y` changed by
+        ("around", "f8"),  # way round to the same place again; inf where there is none
         ("half_length", "f8"),
         ("half_width", "f8"),
         ("in_own_lane", "?"),  # drives in a lane meant for its direction

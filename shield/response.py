@@ -150,10 +150,12 @@ def _take_in(memory, ego, user, ego_params, other_params, rules, dt):
 def forget_safe(memory):
     """Drop a memory of safety that a jump of the lane frame made worthless, in place (hole H5).
 
-    If the pair is unsafe now, that is inherited danger: nobody's doing, answered on both axes.
+    The last sample is to be taken in again, as it is in the new frame. If the pair was unsafe by that,
+    the danger is inherited: nobody's doing, answered on both axes.
     """
     if memory.since == 0:
-        memory.age, memory.axes, memory.skipped = 0, NEVER, False
+        memory.skipped = memory.skipped or memory.age > 0
+        memory.age, memory.axes = 0, NEVER
 
 
 @compiled

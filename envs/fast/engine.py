@@ -304,7 +304,7 @@ class Engine:
             ways = compile_ways(network, net, float(scenario.config["dt"][0])) if settings else no_ways()
             crossings = np.zeros((num_envs, watched), CROSSING)
         else:
-            frames = compile_lane_frames(network) if settings else no_lane_frames()
+            frames = compile_lane_frames(network, settings) if settings else no_lane_frames()
             past = make_past(num_envs, watched)
         self.world = World(
             scenario.config,

@@ -180,7 +180,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         acceleration, steering = car.acceleration, car.steering
     # only who is nearer than anybody was before, in this decision or this episode, changes the tally
     nearest, soonest = max(step.margin_lon, step.margin_lat), episode.min_ttc
-    curvature = measure(cars, episode, lanes, sight, distances, watch.boxes, settings, False, nearest, soonest)
+    bend = measure(cars, episode, lanes, sight, distances, watch.boxes, settings, False, nearest, soonest)
     ego, users, memory = past.ego[episode.turn], sight.users, past.memory
     who = past.near[: episode.near]
     danger = find_danger(
@@ -203,7 +203,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     wish = Command(acceleration, slip)
     response = Response(wish, False, False)
     if settings.overrides:
-        body = Body(car.length / 2, watch.max_slip, curvature)
+        body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack)
         response = respond(wish, danger, ego, body, settings.rules, settings.dt)
         command, steered = response.command, steering
         if command.slip != wish.slip:
@@ -214,7 +214,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     pairs = broken = 0
     if danger.dangerous:
         pairs, broken = judge_frame(
-            ego, users, memory, response.command, curvature, settings.ego, settings.other, settings.dt, who
+            ego, users, memory, response.command, bend.curvature, settings.ego, settings.other, settings.dt, who
         )
     _count(episode, step, danger, response, pairs, broken, settings.overrides)
     if danger.partner >= 0:

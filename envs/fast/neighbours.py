@@ -12,11 +12,12 @@ import numpy as np
 from envs.fast.compiled import merged
 from envs.fast.network import heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
-from envs.highway import road_through
+from envs.highway import Settings
+from envs.roads import reach_of, road_through
 from shield.compiled import rare
 from shield.controller import SAFE_BEYOND_DOUBT, may_be_next
 from shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
-from shield.lane_frame import same_frame, to_lane_frame
+from shield.lane_frame import look_ahead, same_frame, to_lane_frame
 from shield.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
 from shield.response import MEMORY, forget_safe
 
@@ -43,7 +44,7 @@ POSE = np.dtype(
 class LaneFrames(NamedTuple):
     """What the shield measures by where distances along lanes keep the ego safe. L lanes."""
 
-    pieces: np.ndarray  # `[P, 8]` pieces of the roads through all lanes
+    pieces: np.ndarray  # `[P, 11]` pieces of the roads through all lanes
     start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
     same: np.ndarray  # `[L, L]` no gap jumps between the two frames
 
@@ -64,9 +65,10 @@ class Distances(NamedTuple):
     past: Past
 
 
-def compile_lane_frames(network) -> LaneFrames:
-    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`."""
-    lanes = [road_through(network, index) for index in network.lanes_dict()]
+def compile_lane_frames(network, settings: Settings) -> LaneFrames:
+    """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`: one each, because its lanes do not fork."""
+    reach = reach_of(settings.ego, settings.other, settings.dt)
+    lanes = [road_through(network, index, reach) for index in network.lanes_dict()]
     same = np.array([[same_frame(a, b) for b in lanes] for a in lanes])
     return LaneFrames(np.concatenate(lanes), np.cumsum([0, *map(len, lanes)]), same)
 
@@ -127,17 +129,20 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
       nearest, soonest: as in `shield.controller.find_danger`.
 
     Returns:
-      Curvature of the lane at the ego [1/m].
+      `shield.lane_frame.Bend` under the ego.
     """
     frames, past, ego, dt = distances.frames, distances.past, cars[episode.ego], settings.dt
     episode.turn = _row(episode, 1)
-    lane_before = _choose_frame(episode, distances, ego.lane)
+    lane_before, jumps = _choose_frame(episode, distances, ego.lane)
     now, before, earlier = past.trail[episode.turn], past.trail[row_before(episode)], past.trail[_row(episode, 1)]
     road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
     road_before = frames.pieces[frames.start[lane_before] : frames.start[lane_before + 1]]
+    if jumps:
+        _start_again(episode, past, road, before, earlier, boxes[0], dt)
+        road_before = road
     me = past.ego[episode.turn]
     _note(ego, now[episode.ego])
-    curvature = _to_record(road, now[episode.ego], before[episode.ego], boxes[0], dt, me)
+    _to_record(road, now[episode.ego], before[episode.ego], boxes[0], dt, me)
     me.wreck, me.in_own_lane = False, True
     threshold = _look_over(cars, episode, ego, me, road, now, sight.x, settings, soonest)
     if not chosen:
@@ -152,7 +157,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
         user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
         if past.memory[i].skipped:
             _make_up(road_before, before[k], earlier[k], box, dt, sight.users_before[i])
-    return curvature
+    return look_ahead(road, ego.x, ego.y, ego.speed, ego.length / 2, dt)
 
 
 @rare
@@ -176,16 +181,21 @@ def row_before(episode):
 
 @merged
 def _choose_frame(episode, distances, lane):
-    """Measure along the lane the ego is on; returns the one before. Gaps that jump with it are nobody's doing."""
+    """Measure along the lane the ego is on: (the one before, do gaps jump with it?)."""
     before = episode.frame_lane
     episode.frame_lane = lane
     if before < 0:
-        return lane
-    if lane != before and not distances.frames.same[before, lane]:
-        for i in range(episode.cars - 1):
-            forget_safe(distances.past.memory[i])
-        _mark_all(episode, distances.past)
-    return before
+        return lane, False
+    return before, lane != before and not distances.frames.same[before, lane]
+
+
+@rare
+def _start_again(episode, past, road, before, earlier, box, dt):
+    """The lane frame has jumped: take in the frame before as it is in the new one. Danger goes on as it was."""
+    for i in range(episode.cars - 1):
+        forget_safe(past.memory[i])
+    _mark_all(episode, past)
+    _to_record(road, before[episode.ego], earlier[episode.ego], box, dt, past.ego[row_before(episode)])
 
 
 @merged
@@ -199,7 +209,7 @@ def _note(car, pose):
 
 @merged
 def _to_record(road, pose, before, box, dt, user):
-    return to_lane_frame(
+    to_lane_frame(
         road, pose.x, pose.y, pose.heading, pose.speed, pose.cos, pose.sin, before.x, before.y, box, dt, user
     )
 
