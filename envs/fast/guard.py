@@ -197,7 +197,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     wish = Command(acceleration, slip)
     response = Response(wish, False, False)
     if settings.overrides:
-        body = Body(car.length / 2, watch.max_slip, curvature)
+        body = Body(car.length / 2, watch.max_slip, curvature, car.kind == DIRECT)
         response = respond(wish, danger, ego, body, settings.rules, settings.dt)
         command, steered = response.command, steering
         if command.slip != wish.slip:
