@@ -201,7 +201,7 @@ def audit_command(memory, ego, command, drift, params, dt):
 def _audit_acceleration(role, tau, v, a, params, dt):
     """Def. 4 on one frame that starts `tau` after the threshold at speed `v`: (duty, excess), 0 = kept."""
     lower, upper = longitudinal_response(role, tau, v, params)
-    stops = upper <= 0.0 and v + a * dt <= _TOLERANCE  # the last braking step is partial, and so is that of a reverse
+    stops = (upper < 0.0 or v <= 0.0) and v + a * dt <= _TOLERANCE  # the last braking step is partial, in reverse too
     if a - upper > _TOLERANCE and not stops:
         return TOO_WEAK, a - upper
     if role == FRONT and lower - a > _TOLERANCE:

@@ -48,6 +48,7 @@ RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_CUT_IN, RESPONSE_GO = 1, 2, 4, 8  # GO:
 _SAFE_BEYOND_DOUBT = 1e-6  # margin of a pair that is far apart: more than rounding can change [m]
 _STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
 _CROOKED = 1.2  # times the heading bound: a car turned farther than this does not back up
+_STRAIGHT = 1.0 / 1.2  # times the heading bound: likewise one that must not move toward somebody beside it
 
 
 class Body(NamedTuple):
@@ -132,6 +133,8 @@ def find_danger(
             braking = owes_braking(memory[i], pair, rules)
             response |= RESPONSE_BRAKE if braking == 1 else (RESPONSE_CUT_IN if braking == 2 else 0)
             response |= RESPONSE_STEER if owes_lateral_stop(memory[i], rules) else 0
+            if owes_lateral_stop(memory[i], rules) and abs(ego.sin) > _STRAIGHT * rules.heading_bound:
+                bounds = _hold(bounds, held)
         margin = max(pair.margin_lon, pair.margin_lat)
         if margin < worst:
             worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat
@@ -230,7 +233,7 @@ def restrict(nominal, bounds, ego, body, rules, dt):
 @inner
 def _least_acceleration(nominal, bounds, v, body, dt):
     """No braking goes on behind standstill, unless the driver asks for reverse then: its last step is partial."""
-    v_next = v + nominal * dt
+    v_next = v + min(nominal, abs(bounds.a_upper)) * dt
     if v > STANDSTILL or not body.backs_up or (v > -STANDSTILL and v_next > -STANDSTILL):
         return -max(v, 0.0) / dt
     return (max(bounds.v_lower, min(v_next, 0.0)) - v) / dt

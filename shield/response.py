@@ -204,12 +204,12 @@ def may_back_up(memory, pair):
     every sample that is safe grants the ego the way back that it takes, if it stops as soon as one is not: speeding up
     backwards for its response time and then braking at `a_min_brake`, C5 included, is the most that it can do with it
     (`_share_toward` and `way_back` in the judge). The other has its own share, as ever: if each keeps to its own,
-    they do not touch. Who is safe to the side has to stay there (Def. 8); in danger with somebody beside or behind the
-    ego stops, whatever kind of danger it is.
+    they do not touch. Who is safe to the side only has to stay there (Def. 8); in danger with somebody beside or behind
+    the ego stops, whatever kind of danger it is.
     """
     if memory.since > 0:
         return pair.ego_is_rear and memory.ego_is_rear
-    return pair.safe_lat or not pair.hems_in
+    return not pair.hems_in or (pair.safe_lat and not pair.safe_lon)
 
 
 @compiled
