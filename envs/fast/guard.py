@@ -318,7 +318,7 @@ def _describe(car, choice, out):
         car.length,
         car.width,
     )
-    out.wreck = car.crashed or car.kind == OBSTACLE
+    out.wreck, out.alert = car.crashed or car.kind == OBSTACLE, False
     out.on, out.lane, out.choice = car.lane, -1, -1
     if car.kind == TRAFFIC or car.kind == META:
         out.lane, out.choice = car.target_lane, choice[car.route + 1, car.target_lane]
