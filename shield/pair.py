@@ -209,7 +209,8 @@ def sampling_margin(w, car, dt):
 def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt):
     """Speeds along the lane as Def. 1 or 2 must assume them, and the required gap."""
     # A follower may turn back into the lane at any time: its whole speed counts.
-    v_ego = _fastest(ego) if ego_is_rear else leading_speed(ego, rules)
+    # An ego that backs up may straighten, too.
+    v_ego = _fastest(ego) if ego_is_rear else min(leading_speed(ego, rules), ego.speed)
     if opposite:
         v_other = -user.speed
         if user.wreck and ego_is_rear:
