@@ -105,6 +105,7 @@ class World(NamedTuple):
     shielded: bool = True
     start_safe: bool = True
     backs_up: bool = False  # the ego often stands, the others are often slow, and it asks for reverse
+    backs_into: bool = False  # the ego backs up whoever is behind
     latency: int = 0  # frames between a command and its effect
     soft_brake: bool = False  # brake by a P controller instead of directly
     free_throttle: bool = False  # outside its duties the ego accelerates and brakes without limit
@@ -454,6 +455,8 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
                 memory[i].axes = LON
     if w.free_throttle and danger.response & 5 == 0:
         a = max(nominal.acceleration, -ego.speed / w.dt)
+    if w.backs_into and ego.speed <= 0.0 and nominal.acceleration < 0.0:
+        a = max(nominal.acceleration, (-w.table.reverse_speed - ego.speed) / w.dt)
     if w.soft_brake and danger.response & 1 != 0:
         a = max(a, -ego.speed / 0.6)
     if w.free_wheel and danger.response & 2 == 0:
