@@ -224,7 +224,8 @@ class ShieldedEgo:
         danger = find_danger(ego, users, *self.last, self.memory, *rules)
         response = Response(wish, False, False)
         if settings.overrides:
-            response = respond(wish, danger, ego, Body(*self.body, curvature, self.backs_up), settings.rules, settings.dt)
+            body = Body(*self.body, curvature, self.backs_up)
+            response = respond(wish, danger, ego, body, settings.rules, settings.dt)
         command = response.command
         pairs, broken = judge_frame(
             ego, users, self.memory, command, curvature, settings.ego, settings.other, settings.dt

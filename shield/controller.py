@@ -211,7 +211,7 @@ def always_on(ego, params, rules, dt):
 
 @inner
 def _slowest(ego, params, rules, dt):
-    """Least speed after this frame where nobody is behind [m/s]: a car that stands may back up slowly, if it is straight.
+    """Least speed after this frame where nobody is behind [m/s]: one that stands may back up slowly, if it is straight.
 
     Backwards its wheels cannot both keep it from moving sideways and turn it straight.
     """

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from highway_env.vehicle.behavior import IDMVehicle
-from junction_world import DT, TABLE, Duel, crossing_pairs, junction
+from junction_world import DT, Duel, crossing_pairs, junction
 from test_plans import verdict_of
 
 from envs import make
@@ -40,7 +40,7 @@ def goes(duel, frames=90):
 
 @pytest.mark.parametrize("entry", [CAUTIOUS, ASSERTIVE])
 def test_it_is_counted_on_once_it_has_stood_for_long_and_not_before(entry):
-    frames = int(round(PATIENCE[entry] / DT))
+    frames = round(PATIENCE[entry] / DT)
     early = sum(goes(stood(duel, 0), frames - 30) for duel in waiting_duels(entry))
     late = sum(goes(stood(duel, frames)) for duel in waiting_duels(entry))
     assert early == 0 and late > 10
@@ -74,7 +74,7 @@ def play(duel, rng, may_start, dawdles=False):
 
 @pytest.mark.parametrize("dawdles", [False, True], ids=["at full throttle", "an ego that dawdles"])
 def test_nobody_is_touched_who_starts_no_sooner_than_the_rule_lets_them(dawdles):
-    rng, frames, gone = np.random.default_rng(0), int(round(PATIENCE[CAUTIOUS] / DT)), 0
+    rng, frames, gone = np.random.default_rng(0), round(PATIENCE[CAUTIOUS] / DT), 0
     notices = int(np.ceil(START_UP / DT))
     for duel in waiting_duels(CAUTIOUS):
         stood(duel, frames)
@@ -85,7 +85,7 @@ def test_nobody_is_touched_who_starts_no_sooner_than_the_rule_lets_them(dawdles)
 
 
 def test_who_moves_off_at_any_other_time_finds_an_ego_that_waits_or_has_gone():
-    rng, frames, left = np.random.default_rng(1), int(round(PATIENCE[CAUTIOUS] / DT)), 0
+    rng, frames, left = np.random.default_rng(1), round(PATIENCE[CAUTIOUS] / DT), 0
     for duel in waiting_duels(CAUTIOUS):
         for at in (0, 2, 4):
             other = Duel(duel.path, int(duel.threats["path"][0]), duel.s, 0.0, float(duel.threats["s"][0]), 0.0)
@@ -97,7 +97,7 @@ def test_who_moves_off_at_any_other_time_finds_an_ego_that_waits_or_has_gone():
 
 
 def test_who_starts_sooner_did_not_give_way():
-    rng, frames, contacts = np.random.default_rng(2), int(round(PATIENCE[CAUTIOUS] / DT)), 0
+    rng, frames, contacts = np.random.default_rng(2), round(PATIENCE[CAUTIOUS] / DT), 0
     for duel in waiting_duels(CAUTIOUS):
         for after in (3, 6, 12):
             other = Duel(duel.path, int(duel.threats["path"][0]), duel.s, 0.0, float(duel.threats["s"][0]), 0.0)
