@@ -127,6 +127,7 @@ class ShieldedEgo:
         self.vehicle = vehicle
         self.settings = settings
         self.body = (vehicle.LENGTH / 2, MAX_SLIP)
+        self.backs_up = not isinstance(vehicle, ControlledVehicle)  # drivers that keep a speed never ask for it
         self.nominal = dict(vehicle.action)
         self.others: list = []
         self.keys: list[int] = []
@@ -183,7 +184,7 @@ class ShieldedEgo:
         danger = find_danger(ego, users, *self.last, self.memory, *rules)
         response = Response(wish, False, False)
         if settings.overrides:
-            response = respond(wish, danger, ego, Body(*self.body, *bend), settings.rules, settings.dt)
+            response = respond(wish, danger, ego, Body(*self.body, *bend, self.backs_up), settings.rules, settings.dt)
         command = response.command
         pairs, broken = judge_frame(
             ego, users, self.memory, command, bend.curvature, settings.ego, settings.other, settings.dt

@@ -66,6 +66,7 @@ CAR_ON_ROAD = np.dtype(
         ("lane", "i8"),  # lane it heads for, -1 = nobody knows
         ("choice", "i8"),  # row of `Roads.choices`: paths of its route, -1 = nobody knows
         ("wreck", "?"),
+        ("alert", "?"),  # is known to wait, not to have broken down
     ],
     align=True,
 )
@@ -329,6 +330,7 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
         car = cars[i]
         samples[i].x, samples[i].y, samples[i].speed = car.x, car.y, car.speed
         samples[i].wreck, samples[i].astray, samples[i].lanes = car.wreck, False, 0
+        samples[i].alert = car.alert
         before = count
         if not car.wreck:
             if intent == KNOWN and car.lane >= 0 and car.choice >= 0:

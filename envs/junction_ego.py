@@ -155,6 +155,7 @@ class JunctionEgo(ShieldedEgo):
             car["x"], car["y"] = v.position
             car["heading"], car["speed"], car["length"], car["width"] = v.heading, v.speed, v.LENGTH, v.WIDTH
             car["wreck"] = v.crashed or not hasattr(v, "action")
+            car["alert"] = "act" in vars(v)  # under a shield, and waits for its turn or for its agent
             car["size"], car["on"] = size, junction.number[v.lane_index]
             car["lane"] = car["choice"] = -1
             heads_for, route = self._declared(v)

@@ -85,7 +85,9 @@ def lane_beside(start: Pose, element: Element, offset: float, reverse: bool = Fa
     phase = heading - turn * np.pi / 2
     phases = phase, phase + kappa * length
     radius = 1.0 / abs(kappa) - turn * offset
-    return CircularLane(centre, radius, *(phases[::-1] if reverse else phases), bool(turn > 0) != reverse, speed_limit=30)
+    return CircularLane(
+        centre, radius, *(phases[::-1] if reverse else phases), bool(turn > 0) != reverse, speed_limit=30
+    )
 
 
 def draw_bend(rng: np.random.Generator, turn: int, lanes: int, oncoming: int, angle: float) -> Element:
@@ -103,7 +105,12 @@ def draw_ring(rng: np.random.Generator, lanes: int, oncoming: int) -> list[Eleme
     corners = [draw_bend(rng, turn, lanes, oncoming, np.pi / 2) for _ in range(4)]
     radii = [1 / abs(corner.curvature) for corner in corners]
     long, wide = (max(radii[i] + radii[i + 1], radii[i - 2] + radii[i - 1]) + rng.uniform(5, 80) for i in (0, 1))
-    sides = long - radii[0] - radii[1], wide - radii[1] - radii[2], long - radii[2] - radii[3], wide - radii[3] - radii[0]
+    sides = (
+        long - radii[0] - radii[1],
+        wide - radii[1] - radii[2],
+        long - radii[2] - radii[3],
+        wide - radii[3] - radii[0],
+    )
     elements = []
     for side, corner in zip(sides, [*corners[1:], corners[0]], strict=True):
         elements += [Element(0.0, side), corner]
@@ -164,7 +171,9 @@ def draw_plan(rng: np.random.Generator, kind: str) -> Plan:
         longest = max(longest, 700.0 * (lanes + oncoming) / _LANES)
         pieces = cut(rng, draw_line(rng, 600.0, lanes, oncoming), longest)
         changes = rng.random() < 0.3 and not oncoming
-        counts = [lanes if i < len(pieces) / 2 or not changes else int(rng.integers(1, lanes + 1)) for i in range(len(pieces))]
+        counts = [
+            lanes if i < len(pieces) / 2 or not changes else int(rng.integers(1, lanes + 1)) for i in range(len(pieces))
+        ]
         way = _sections(pieces, start, counts, "")
         return Plan(kind, way, way, oncoming, way[-1].end if rng.random() < 0.7 else None)
     longest = max(longest, 1200.0 * lanes / _LANES)

@@ -37,6 +37,7 @@ from shield.response import (
     remember,
     role_of_ego,
     role_of_other,
+    slowest_in_danger,
 )
 
 KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
@@ -119,7 +120,7 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
             share = _share_front(tau, memory.v_other, other_params, dt)
             _blame_other(memory, TOO_SHORT, share - travel_other + longer_other)
         else:
-            share = _share_front(tau, memory.v_ego, ego_params, dt)
+            share = _share_front(tau, memory.v_ego, ego_params, dt) - memory.way_back
             _blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
             share = _share_rear(tau, memory.v_other, other_params, dt)
             _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
@@ -188,6 +189,10 @@ def audit_command(memory, ego, command, drift, params, dt):
         )
         if duty != KEPT:
             return duty, excess
+        if role_of_ego(memory) == FRONT and memory.since * dt >= params.response_time - _TOLERANCE:
+            excess = slowest_in_danger(ego.speed, params, dt) - (ego.speed + command.acceleration * dt)
+            if excess > _TOLERANCE:
+                return REVERSED, excess
     if memory.role_now != FRONT:
         duty, excess = _audit_acceleration(
             memory.role_now, memory.role_for * dt, ego.speed, command.acceleration, params, dt
@@ -210,7 +215,7 @@ def audit_command(memory, ego, command, drift, params, dt):
 def _audit_acceleration(role, tau, v, a, params, dt):
     """Def. 4 on one frame that starts `tau` after the threshold at speed `v`: (duty, excess), 0 = kept."""
     lower, upper = longitudinal_response(role, tau, v, params)
-    stops = upper < 0.0 and v + a * dt <= _TOLERANCE  # the last braking step is partial
+    stops = (upper < 0.0 or v <= 0.0) and v + a * dt <= _TOLERANCE  # the last braking step is partial, in reverse too
     if a - upper > _TOLERANCE and not stops:
         return TOO_WEAK, a - upper
     if role == FRONT and lower - a > _TOLERANCE:

@@ -10,8 +10,19 @@ from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
 from shield.kinematics import time_to_collision
 from shield.lane_frame import beyond
-from shield.pair import assess, leading_speed, least_cosine, least_margin, own_share, toward
-from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, owes_no_approach, remember
+from shield.longitudinal import reach_from_rest
+from shield.pair import STANDSTILL, assess, leading_speed, least_cosine, least_margin, own_share, toward
+from shield.response import (
+    Bounds,
+    catch_up,
+    may_back_up,
+    merge,
+    owes_braking,
+    owes_lateral_stop,
+    owes_no_approach,
+    remember,
+    slowest_in_danger,
+)
 
 
 class Danger(NamedTuple):
@@ -38,9 +49,10 @@ class Response(NamedTuple):
 # PRESENT: brake for who is ahead by now; GO: on through a junction
 RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_PRESENT, RESPONSE_GO = 1, 2, 4, 8
 
-SAFE_BEYOND_DOUBT = 1e-6  # margin of a pair that is far apart: more than rounding can change [m]
+_SAFE_BEYOND_DOUBT = 1e-6  # margin of a pair that is far apart: more than rounding can change [m]
 _STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
-_STANDSTILL = 1e-6  # below this speed nothing moves sideways [m/s]
+_CROOKED = 1.2  # times the heading bound: a car turned farther than this does not back up
+_STRAIGHT = 1.0 / 1.2  # times the heading bound: likewise one that must not move toward somebody beside it
 
 
 class Body(NamedTuple):
@@ -50,6 +62,7 @@ class Body(NamedTuple):
     max_slip: float  # largest slip angle the steering reaches [rad]
     curvature: float  # of the lane under the ego, see `shield.lane_frame.Bend` [1/m]
     slack: float = 0.0  # likewise [rad]
+    backs_up: bool = False  # its driver asks for reverse by braking at standstill; others only hold then
 
 
 @compiled
@@ -94,6 +107,7 @@ def find_danger(
     dangerous, response = False, 0
     share_ego = own_share(ego.speed, ego.cos, ego_params, dt)
     lead_ego, least_cos = leading_speed(ego, rules), least_cosine(rules)
+    far, held = beyond_doubt(ego.speed, ego_params, dt), slowest_in_danger(ego.speed, ego_params, dt)
     for a in range(how_many(who, users)):
         i = which(who, a)
         user = users[i]
@@ -110,19 +124,23 @@ def find_danger(
             other_params,
             dt,
         )
-        if memory[i].since == 0 and margin > max(worst, SAFE_BEYOND_DOUBT) and not _may_be_next(ego, user, ttc, rules):
+        if memory[i].since == 0 and margin > max(worst, far) and not _may_be_next(ego, user, ttc, rules):
             memory[i].skipped = True
             continue
         catch_up(memory[i], ego_before, users_before[i], ego_params, other_params, rules, dt)
         pair = assess(ego, user, ego_params, other_params, rules, dt)
         remember(memory[i], pair, ego, user, dt)
         bounds = merge(bounds, memory[i], ego_params, rules, dt)
+        if rules.limits and not may_back_up(memory[i], pair):
+            bounds = _hold(bounds, held)
         if memory[i].since > 0:
             dangerous = True
             braking = owes_braking(memory[i], rules)
             response |= RESPONSE_BRAKE if braking == 1 else (RESPONSE_PRESENT if braking == 2 else 0)
             if owes_lateral_stop(memory[i], rules) or owes_no_approach(memory[i], rules):
                 response |= RESPONSE_STEER
+                if abs(ego.sin) > _STRAIGHT * rules.heading_bound:
+                    bounds = _hold(bounds, held)
         margin = max(pair.margin_lon, pair.margin_lat)
         if margin < worst:
             worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat
@@ -157,6 +175,21 @@ def respond(nominal, danger, ego, body, rules, dt):
 
 
 @inner
+def _hold(bounds, v_lower):
+    return Bounds(
+        bounds.a_lower, bounds.a_upper, bounds.left, bounds.right, bounds.left_next, bounds.right_next, v_lower
+    )
+
+
+@compiled
+def beyond_doubt(v, params, dt):
+    """Margin of a pair that is far apart [m]: a standing ego may even begin to back up."""
+    if v > STANDSTILL:
+        return _SAFE_BEYOND_DOUBT
+    return _SAFE_BEYOND_DOUBT + reach_from_rest(params, params.a_min_brake, dt)
+
+
+@inner
 def _may_be_next(ego, user, ttc, rules):
     """`may_be_next` of a measured pair, driving the same way."""
     gap_lon = signed_gap(user.s - ego.s, ego.half_length, user.half_length)
@@ -174,11 +207,24 @@ def may_be_next(ahead, gap_lon, gap_lat, closing, ttc):
 def always_on(ego, params, rules, dt):
     """Limits that hold even where nobody is in danger (conditions C1, C1y of the sampled proof)."""
     if not rules.limits:
-        return Bounds(-np.inf, np.inf, np.inf, np.inf, np.inf, np.inf)
+        return Bounds(-np.inf, np.inf, np.inf, np.inf, np.inf, np.inf, min(ego.speed, 0.0))
     cap = max((params.v_cap - ego.speed) / dt, 0.0)
     growth = params.a_lat_max_accel * dt
     left, right = max(toward(-1.0, ego), 0.0) + growth, max(toward(1.0, ego), 0.0) + growth
-    return Bounds(-params.a_max_brake, min(params.a_max_accel, cap), left, right, left, right)
+    slowest = _slowest(ego, params, rules, dt)
+    return Bounds(-params.a_max_brake, min(params.a_max_accel, cap), left, right, left, right, slowest)
+
+
+@inner
+def _slowest(ego, params, rules, dt):
+    """Least speed after this frame where nobody is behind [m/s]: one that stands may back up slowly, if it is straight.
+
+    Backwards its wheels cannot both keep it from moving sideways and turn it straight.
+    """
+    held = slowest_in_danger(ego.speed, params, dt)
+    if ego.speed > STANDSTILL or ego.cos <= 0.0 or abs(ego.sin) > _CROOKED * rules.heading_bound:
+        return held
+    return min(max(ego.speed - params.a_max_accel * dt, -rules.reverse_speed), held)
 
 
 @compiled
@@ -186,8 +232,17 @@ def restrict(nominal, bounds, ego, body, rules, dt):
     """The command nearest to the nominal one inside the bounds."""
     a = min(max(nominal.acceleration, bounds.a_lower), bounds.a_upper)
     if bounds.a_lower > -np.inf or bounds.a_upper < 0.0:
-        a = max(a, -max(ego.speed, 0.0) / dt)  # never reverse; the last braking step is partial
+        a = max(a, _least_acceleration(nominal.acceleration, bounds, ego.speed, body, dt))
     return Command(a, _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt))
+
+
+@inner
+def _least_acceleration(nominal, bounds, v, body, dt):
+    """No braking goes on behind standstill, unless the driver asks for reverse then: its last step is partial."""
+    v_next = v + min(nominal, abs(bounds.a_upper)) * dt
+    if v > STANDSTILL or not body.backs_up or (v > -STANDSTILL and v_next > -STANDSTILL):
+        return -max(v, 0.0) / dt
+    return (max(bounds.v_lower, min(v_next, 0.0)) - v) / dt
 
 
 @inner
@@ -202,9 +257,11 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     the car no faster than its heading already does, so no bound that was kept so far is lost.
     """
     v = ego.speed
-    if v < _STANDSTILL or (bounds.left == np.inf and bounds.right == np.inf):
+    if abs(v) < STANDSTILL or (bounds.left == np.inf and bounds.right == np.inf):
         return slip
-    v_next = max(v + a * dt, _STANDSTILL)
+    if v < 0.0:
+        return _restrict_slip_backwards(slip, bounds, ego, body, rules, dt)
+    v_next = max(v + a * dt, STANDSTILL)
     psi, gain = ego.heading, v * dt / body.half_wheelbase
     turned = body.curvature * v * dt  # the lane turns under the car during the frame ...
     drift = 0.5 * turned * v  # ... and curves away from its tangent [m/s]
@@ -227,6 +284,27 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
         psi_low, psi_high = max(psi_low, -largest), min(psi_high, largest)
     low = max(low, min(_arcsin((psi_low - psi + turned) / gain), neutral))
     high = min(high, max(_arcsin((psi_high - psi + turned) / gain), neutral))
+    low, high = max(low, -body.max_slip), min(high, body.max_slip)
+    return min(max(slip, low), high)
+
+
+@inner
+def _restrict_slip_backwards(slip, bounds, ego, body, rules, dt):
+    """The same in reverse: first the lateral speed of this frame, then the heading.
+
+    The slip that ends the sideways motion turns the car farther from the lane there, by v dt / half_wheelbase of its
+    angle. So a car that has to stop moving sideways also stops backing up, and comes to rest before that matters: until
+    then its side sweeps no more than the speed at its angle to the lane does, which is less than its share (Def. 6).
+    """
+    v, psi, gain = ego.speed, ego.heading, ego.speed * dt / body.half_wheelbase
+    turned = body.curvature * v * dt
+    drift = 0.5 * turned * v
+    low, high = _arcsin((bounds.right + drift) / v) - psi, _arcsin((-bounds.left + drift) / v) - psi
+    if rules.heading_bound < 1.0:
+        largest = np.arcsin(rules.heading_bound)
+        straight_low = _arcsin((largest - psi + turned) / gain)
+        straight_high = _arcsin((-largest - psi + turned) / gain)
+        low, high = min(max(low, straight_low), high), max(min(high, straight_high), low)
     low, high = max(low, -body.max_slip), min(high, body.max_slip)
     return min(max(slip, low), high)
 

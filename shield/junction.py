@@ -41,7 +41,10 @@ from shield.plans import (
     GO,
     NEVER,
     NOW,
+    PATIENCE,
     SLACK,
+    STANDING,
+    START_UP,
     STOP,
     Scene,
     begin,
@@ -72,6 +75,8 @@ CROSSING = np.dtype(
         ("items", "i8"),  # plans at that sample: STOP, GO or both; 0 = never any
         ("follows", "?"),  # was the ego's follower at the last sample, on one of its ways at least
         ("behind", "?"),  # and has been so at a safe distance
+        ("stood", "i8"),  # frames for which it has been standing, 0 = it moves
+        ("counted_on", "i8"),  # frames for which the ego has had no plan but one that counts on that (rule J9)
         ("relied", "?"),  # is counted on to give way on this frame
         ("relied_before", "?"),  # was so on the frame before
         ("way", "i8"),  # path of the ego then
@@ -101,6 +106,7 @@ SAMPLE = np.dtype(
         ("reachable", "i8"),  # those, and lanes beside them
         ("wreck", "?"),
         ("astray", "?"),  # on no lane at all
+        ("alert", "?"),  # is known to wait: nobody counts on it to stand
     ],
     align=True,
 )
@@ -209,12 +215,24 @@ def sort_out(scene, memory, entry):
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         threat.ignored, threat.left_out = threat.follows, False
+        threat.stands_for = _stands_for(threat, memory[threat.user], entry, scene.dt) if threat.path >= 0 else 0.0
         look_ahead(scene, threat)
         if threat.path >= 0 and not threat.follows and entry != CAUTIOUS and not threat.wreck and threat.red_for == 0.0:
             obliged = entry == ASSERTIVE or threat.priority > 0
             if obliged and can_give_way(scene, threat):
                 threat.ignored = True
                 memory[threat.user].relied = True
+
+
+@inner
+def _stands_for(threat, memory, entry, dt):
+    """How long is a road user counted on to stand still, because it has stood for long (rule J9) [s]? 0 = it is not.
+
+    Its time runs from when the ego has no other plan left, once: only when the ego has one it begins anew.
+    """
+    if threat.wreck or abs(threat.v) >= STANDING or memory.stood * dt < PATIENCE[entry]:
+        return 0.0
+    return max(START_UP - memory.counted_on * dt, 0.0)
 
 
 @inner
@@ -354,6 +372,8 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     """
     _judge_motion(sample, memory, scene.other, scene.dt)
     scene = _alone_with(scene, i)
+    memory.stood = memory.stood + 1 if abs(sample.speed) < STANDING and not sample.alert else 0
+    memory.counted_on = memory.counted_on + 1 if _counts_on_standing(scene, i, a) else 0
     may_follow, follows, gap_is_safe = _is_behind(scene, i)
     dangerous, kept, items, cut_in = False, True, STOP, False
     followed, memory.behind = memory.behind, may_follow and (memory.behind or gap_is_safe)
@@ -426,10 +446,29 @@ def _judge_motion(sample, memory, other, dt):
         duty, excess = BRAKED, slower / dt
     elif sample.speed < -_REVERSING:
         duty, excess = REVERSED, -sample.speed
-    elif memory.relied_before:
+    elif memory.relied_before or (memory.counted_on > 0 and abs(sample.speed) >= STANDING):
         duty = GAVE_NO_WAY  # forgotten by `judge_user` if the ego still has a plan
     if duty != KEPT and memory.other_broke == KEPT:
         memory.other_broke, memory.other_excess = duty, excess
+
+
+@apart
+def _counts_on_standing(scene, i, a):
+    """Has the ego no plan after its acceleration, but one that counts on a road user to stand?"""
+    stands_for = scene.threats[0].stands_for if len(scene.threats) > 0 else 0.0  # the same on all its ways
+    if stands_for == 0.0:
+        return False
+    _count_on(scene, 0.0)
+    counts = not _leaves_plan(scene, i, a)
+    _count_on(scene, stands_for)
+    return counts
+
+
+@inner
+def _count_on(scene, stands_for):
+    for k in range(len(scene.threats)):
+        scene.threats[k].stands_for = stands_for
+        look_ahead(scene, scene.threats[k])
 
 
 @inner

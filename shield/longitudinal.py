@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from shield.compiled import choose, compiled_for_arrays
+from shield.compiled import choose, compiled, compiled_for_arrays
 from shield.kinematics import forward_reach, reach, response_distance, speed_after_response, stopping_distance
 
 
@@ -121,6 +121,16 @@ def euler_margin(closing, b, dt):
       dt: length of a frame [s].
     """
     return np.maximum(closing, 0.0) * dt / 2 + b * dt**2 / 8
+
+
+@compiled
+def reach_from_rest(params, b, dt):
+    """How far a standing car that starts may get until it rests again, sampled every `dt` (Def. 2) [m].
+
+    It speeds up for its response time and then brakes at `b`.
+    """
+    way = forward_reach(0.0, params.response_time, params.a_max_accel, b, params.v_cap)
+    return way + euler_margin(0.0, b, dt)
 
 
 @compiled_for_arrays

@@ -8,7 +8,7 @@ from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
 from shield.kinematics import reach, stopping_distance
 from shield.lateral import approach_no_credit, d_min_no_credit, d_min_of_pair, lateral_euler_margin
-from shield.longitudinal import d_min_longitudinal, euler_margin, is_safe_longitudinally
+from shield.longitudinal import d_min_longitudinal, euler_margin, is_safe_longitudinally, reach_from_rest
 
 # One road user in the lane frame of the ego. SI units; lateral values positive to the right.
 ROAD_USER = np.dtype(
@@ -31,7 +31,7 @@ ROAD_USER = np.dtype(
 )
 
 
-_STANDSTILL = 1e-6  # slower than this is standing [m/s]
+STANDSTILL = 1e-6  # slower than this is standing [m/s]
 
 
 class Pair(NamedTuple):
@@ -50,6 +50,8 @@ class Pair(NamedTuple):
     v_other: float
     w_ego: float  # speeds toward each other across the lane, not negative [m/s]
     w_other: float
+    hems_in: bool  # a standing ego has no room to back up toward the other, which is behind it
+    way_back: float  # else how far it may [m]
 
 
 @compiled
@@ -92,6 +94,13 @@ def assess(ego, user, ego_params, other_params, rules, dt):
         d_lat += lateral_euler_margin(w_ego, ego_params, dt) + sampling_margin(w_other, other_params, dt)
     d_lat += rules.overlap_margin
 
+    hems_in, way_back = False, 0.0
+    if not ego_is_rear and v_ego == 0.0 and is_following(v_ego, v_other, opposite):
+        # the distance of Lemma 2 leaves a leader nothing to go back
+        way_back = reach_from_rest(ego_params, ego_params.a_min_brake, dt)
+        hems_in = gap_lon < d_lon + way_back
+        way_back = 0.0 if hems_in else way_back
+
     return Pair(
         is_safe_longitudinally(gap_lon, d_lon),
         gap_lat >= d_lat,
@@ -106,6 +115,8 @@ def assess(ego, user, ego_params, other_params, rules, dt):
         v_other,
         w_ego,
         w_other,
+        hems_in,
+        way_back,
     )
 
 
@@ -199,7 +210,8 @@ def sampling_margin(w, car, dt):
 def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt):
     """Speeds along the lane as Def. 1 or 2 must assume them, and the required gap."""
     # A follower may turn back into the lane at any time: its whole speed counts.
-    v_ego = _fastest(ego) if ego_is_rear else leading_speed(ego, rules)
+    # An ego that backs up may straighten, too.
+    v_ego = _fastest(ego) if ego_is_rear else min(leading_speed(ego, rules), ego.speed)
     if opposite:
         v_other = -user.speed
         if user.wreck and ego_is_rear:
@@ -232,7 +244,7 @@ def _fastest(user):
 @inner
 def _settled(v):
     """A speed without the rounding error that a car which has just stopped is left with [m/s]."""
-    return 0.0 if abs(v) < _STANDSTILL else v
+    return 0.0 if abs(v) < STANDSTILL else v
 
 
 @compiled

@@ -201,3 +201,4 @@ class Rules(NamedTuple):
     heading_bound: float = 0.1  # largest sine of the angle between car and lane [1]; 1 = no bound
     discretisation_margin: bool = True  # C5: explicit Euler, the last partial braking step
     overlap_margin: float = 0.1  # the simulator flags *predicted* contact, with slip left out [m]
+    reverse_speed: float = 1.5  # fastest that the ego may back up (hole H12): walking speed; 0 = never [m/s]

@@ -34,6 +34,11 @@ EVERYBODY = np.int64(-1)  # whom a plan stays clear of
 ANYWHERE = np.bool_(False)  # it may come to rest wherever nobody meets it, not only `at_line`
 NOW, NEXT = np.int64(0), np.int64(1)  # frames of a plan
 
+# Rule J9. Who has stood for `PATIENCE` has to notice first that somebody counts on that: it stands for `START_UP` more.
+PATIENCE = (15.0, 5.0, 5.0)  # by `entry`: cautious, priority, assertive [s]
+START_UP = 2.5  # from when the ego has no other plan [s]
+STANDING = 0.5  # slower than this is standing: highway-env's drivers creep [m/s]
+
 SLACK = 0.2  # a new plan stays clear even if the ego is this far off; one in force only has to stay clear [m]
 _SHORT_CUT = 1.0  # a car that cuts the corners of its path gains or loses at most this ...
 _SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
@@ -58,6 +63,7 @@ THREAT = np.dtype(
         ("half_length", "f8"),
         ("wreck", "?"),  # has crashed: it may stop on the spot
         ("priority", "i8"),  # +1: the ego has the right of way over it, -1: the other way round
+        ("stands_for", "f8"),  # it is counted on to stand for this long still [s]; 0 = it is not
         ("red_for", "f8"),  # it is counted on to wait at a light for this long [s]; 0 = it is not
         ("line", "f8"),  # and until then its centre stays behind this arc length [m]
         ("follows", "?"),  # drives behind the ego on its way
@@ -120,7 +126,11 @@ def farthest(threat, t, other):
     """Largest arc length at which it can be `t` from now [m]."""
     if threat.wreck:
         return threat.s + max(threat.v, 0.0)  # a wreck rolls to rest with a time constant of 1 s
-    driven = response_distance(max(threat.v, 0.0), t, other.a_max_accel, threat.cap)
+    if threat.stands_for > 0.0:
+        creeps, t = min(t, threat.stands_for), max(t - threat.stands_for, 0.0)
+        driven = STANDING * creeps + response_distance(STANDING, t, other.a_max_accel, threat.cap)
+    else:
+        driven = response_distance(max(threat.v, 0.0), t, other.a_max_accel, threat.cap)
     if threat.red_for > 0.0:
         driven = min(driven, threat.line - threat.s + _beyond_line(max(t - threat.red_for, 0.0), other))
     return threat.s + driven + _short_cut(driven)
@@ -144,6 +154,8 @@ def _short_cut(driven):
 @inner
 def fastest(threat, t, other):
     """Largest speed it can have `t` from now [m/s]."""
+    if threat.stands_for > 0.0:
+        return max(STANDING, min(STANDING + other.a_max_accel * max(t - threat.stands_for, 0.0), threat.cap))
     return max(threat.v, min(threat.v + other.a_max_accel * t, threat.cap), 0.0)
 
 
@@ -292,7 +304,12 @@ def _frames_before(threat, s, other, dt):
         return NOW if farthest(threat, 0.0, other) >= s else NEVER - 1
     distance = s - threat.s - _ROUNDING
     driven = max(distance - _SHORT_CUT, distance / (1.0 + _SHORT_CUT_SHARE))
-    t = time_to_cover_accelerating(driven, max(threat.v, 0.0), other.a_max_accel, threat.cap)
+    if threat.stands_for > 0.0:
+        rest = driven - STANDING * threat.stands_for
+        starting = time_to_cover_accelerating(rest, STANDING, other.a_max_accel, threat.cap)
+        t = threat.stands_for + starting if rest > 0.0 else driven / STANDING
+    else:
+        t = time_to_cover_accelerating(driven, max(threat.v, 0.0), other.a_max_accel, threat.cap)
     return int(min(np.ceil(t / dt - _UNSURE), NEVER - 1))
 
 

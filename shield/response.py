@@ -35,6 +35,7 @@ MEMORY = np.dtype(
         ("travel_other", "f8"),
         ("approach_ego", "f8"),
         ("approach_other", "f8"),
+        ("way_back", "f8"),  # that an ego which stood there, ahead of the other, may back up in all [m]
         # speed of the other at the last sample and its acceleration over the frame before [m/s], [m/s^2]
         ("speed_other", "f8"),
         ("acceleration_other", "f8"),
@@ -91,6 +92,7 @@ def remember(memory, pair, ego, user, dt):
         memory.w_ego, memory.w_other = pair.w_ego, pair.w_other
         memory.travel_ego = memory.travel_other = 0.0
         memory.approach_ego = memory.approach_other = 0.0
+        memory.way_back = pair.way_back
         memory.half_length_ego, memory.half_length_other = ego.half_length, user.half_length
         memory.ego_broke = memory.other_broke = 0
         memory.ego_excess = memory.other_excess = 0.0
@@ -204,12 +206,13 @@ def braking_owed(role, params):
 def longitudinal_response(role, tau, v, params):
     """Accelerations a driver may choose in danger, in the own driving direction (Def. 4).
 
-    After standstill the car holds: reversing out of one danger would make another (hole H12).
+    After standstill the car holds, and one that backs up does not drive forward: reversing out of one danger must not
+    make another (hole H12), so it has a rule of its own (`may_back_up`).
 
     Args:
       role: REAR, FRONT, CORRECT or WRONG at the threshold.
       tau: time since the threshold [s].
-      v: own speed [m/s], >= 0.
+      v: own speed [m/s], negative in reverse.
       params: `RSSParams` of the driver.
 
     Returns:
@@ -222,6 +225,38 @@ def longitudinal_response(role, tau, v, params):
     if v <= 0.0:
         return 0.0, 0.0
     return -params.a_max_brake, -braking_owed(role, params)
+
+
+# ---------------------------------------------------------------- backing up: hole H12
+
+
+@compiled
+def may_back_up(memory, pair):
+    """May the ego begin to back up, or go on with it, for all that it owes one road user?
+
+    Def. 4 as printed lets a car that has stopped reverse, whoever is behind it. Here it may while there is no danger
+    with anybody behind, and begins only where both have room in the way of each other:
+
+      gap >= what the other needs to stop behind a standing ego (Lemma 2)
+             + what the ego needs if it starts backwards now and then stops (`way_back`; Def. 2 with the ego turned
+               round and standing)
+
+    From the next frame on it has a speed toward the other, and its distance is that of Def. 2 anyhow (`assess`). So
+    every sample that is safe grants the ego the way back that it takes, if it stops as soon as one is not: speeding up
+    backwards for its response time and then braking at `a_min_brake`, C5 included, is the most that it can do with it
+    (`_share_toward` and `way_back` in the judge). The other has its own share, as ever: if each keeps to its own,
+    they do not touch. Who is safe to the side only has to stay there (Def. 8); in danger with somebody beside or behind
+    the ego stops, whatever kind of danger it is.
+    """
+    if memory.since > 0:
+        return pair.ego_is_rear and memory.ego_is_rear
+    return not pair.hems_in or (pair.safe_lat and not pair.safe_lon)
+
+
+@compiled
+def slowest_in_danger(v, params, dt):
+    """Least speed after a frame of a car that may not back up, negative while it still rolls back [m/s]."""
+    return min(v + params.a_min_brake * dt, 0.0)
 
 
 # ---------------------------------------------------------------- lateral: Def. 8
@@ -285,6 +320,7 @@ class Bounds(NamedTuple):
     right: float
     left_next: float  # the same for the speed the new heading commits to
     right_next: float
+    v_lower: float  # speed after this frame, negative in reverse [m/s]
 
 
 @compiled
@@ -322,7 +358,9 @@ def merge(bounds, memory, params, rules, dt):
     if braking != 0:
         inherited = braking == 1 and memory.axes == NEVER and rules.brake_if_inherited
         a_upper = min(a_upper, -params.a_max_brake if inherited else -params.a_min_brake)
-    bounds = Bounds(bounds.a_lower, a_upper, bounds.left, bounds.right, bounds.left_next, bounds.right_next)
+    bounds = Bounds(
+        bounds.a_lower, a_upper, bounds.left, bounds.right, bounds.left_next, bounds.right_next, bounds.v_lower
+    )
     if owes_lateral_stop(memory, rules):
         bounds = _slow_down(bounds, memory.side, memory.since, memory.w_ego, params, dt)
     if owes_no_approach(memory, rules):
@@ -340,4 +378,4 @@ def _slow_down(bounds, side, frame, w, params, dt):
         right, right_next = min(right, now), min(right_next, soon)
     else:
         left, left_next = min(left, now), min(left_next, soon)
-    return Bounds(bounds.a_lower, bounds.a_upper, left, right, left_next, right_next)
+    return Bounds(bounds.a_lower, bounds.a_upper, left, right, left_next, right_next, bounds.v_lower)

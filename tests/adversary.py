@@ -22,7 +22,7 @@ from shield.response import LAT, LON, MEMORY, merge, remember
 
 HALF_WHEELBASE = 2.5  # [m]
 MAX_SLIP = float(np.arctan(np.tan(np.pi / 3) / 2))  # of highway-env's steering [rad]
-BODY = Body(HALF_WHEELBASE, MAX_SLIP, 0.0)
+BODY = Body(HALF_WHEELBASE, MAX_SLIP, 0.0, True)
 MAX_SPEED = 40.0  # [m/s]
 CAR_WIDTH, OBSTACLE_SIZE = 2.0, 2.0  # [m]
 
@@ -80,6 +80,8 @@ EPISODE = np.dtype(
         ("answered_now", "i8"),  # frames braked for who is ahead by now (hole H23)
         ("overridden", "i8"),  # frames
         ("heading", "f8"),  # largest of the ego [rad]
+        ("backed_up", "i8"),  # frames in reverse
+        ("fastest_back", "f8"),  # [m/s]
         ("gap_lon", "f8"),  # smallest gap in danger, where this axis has to keep the pair apart [m]
         ("gap_lat", "f8"),
     ],
@@ -102,6 +104,8 @@ class World(NamedTuple):
     lawful: bool = True  # the others keep the law
     shielded: bool = True
     start_safe: bool = True
+    backs_up: bool = False  # the ego often stands, the others are often slow, and it asks for reverse
+    backs_into: bool = False  # the ego backs up whoever is behind
     latency: int = 0  # frames between a command and its effect
     soft_brake: bool = False  # brake by a P controller instead of directly
     free_throttle: bool = False  # outside its duties the ego accelerates and brakes without limit
@@ -220,8 +224,15 @@ def margins(ego, car, w):
         v_back, v_front = back.speed, front.speed * min(straight, np.cos(front.heading))
         if front.wreck:
             v_front = 0.0
-        need = max(_farthest(v_back, rear, rear.a_min_brake) - v_front**2 / (2 * lead.a_max_brake), 0.0)
-        need += euler * (max(v_back - v_front, 0.0) * dt / 2 + rear.a_min_brake * dt**2 / 8)
+        if v_front < 0.0:  # the ego backs up: each comes toward the other
+            need = _farthest(v_back, rear, rear.a_min_brake) + _farthest(-v_front, lead, lead.a_min_brake)
+            need += euler * ((v_back - v_front) * dt / 2 + (rear.a_min_brake + lead.a_min_brake) * dt**2 / 8)
+        else:
+            if v_back < 0.0:  # it backs away from the other, which may come after it
+                need = _farthest(v_back, rear, rear.a_min_brake) + _farthest(-v_front, lead, lead.a_min_brake)
+            else:
+                need = max(_farthest(v_back, rear, rear.a_min_brake) - v_front**2 / (2 * lead.a_max_brake), 0.0)
+            need += euler * (max(v_back - v_front, 0.0) * dt / 2 + rear.a_min_brake * dt**2 / 8)
     need += max(e.standstill_gap, o.standstill_gap)
     half_e, half_o = _extents(ego, w), _extents(car, w)
     lon = abs(car.x - ego.x) - half_e[0] - half_o[0] - need
@@ -409,6 +420,8 @@ def _place(rng, car, ego, where, squeeze, w):
         car.speed = _between(rng, 0.0, MAX_SPEED) if rng.random() < 0.9 else 0.0
         if rng.random() < 0.3:
             car.speed = min(max(ego.speed + _between(rng, -3.0, 3.0), 0.0), MAX_SPEED)
+        if w.backs_up and rng.random() < 0.6:
+            car.speed = _between(rng, 0.0, 3.0) * rng.random()
         if squeeze or w.vice == OVERTAKES:
             car.facing, car.speed = 1.0, ego.speed
         bound = w.table.heading_bound
@@ -477,6 +490,8 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
                 memory[i].axes = LON
     if w.free_throttle and danger.response & 5 == 0:
         a = max(nominal.acceleration, -ego.speed / w.dt)
+    if w.backs_into and ego.speed <= 0.0 and nominal.acceleration < 0.0:
+        a = max(nominal.acceleration, (-w.table.reverse_speed - ego.speed) / w.dt)
     if w.soft_brake and danger.response & 1 != 0:
         a = max(a, -ego.speed / 0.6)
     if w.free_wheel and danger.response & 2 == 0:
@@ -525,6 +540,8 @@ def episode(rng, w, result, film):
     ego.speed = _between(rng, 0.0, MAX_SPEED) if rng.random() < 0.95 else 0.0
     bound = w.table.heading_bound
     ego.heading = 0.0 if rng.random() < 0.5 or w.vice == OVERTAKES else _between(rng, -bound, bound) * rng.random()
+    if w.backs_up and rng.random() < 0.7:
+        ego.speed = 0.0 if rng.random() < 0.8 else -w.table.reverse_speed * rng.random()
     ego.u, ego.along = ego.speed * np.sin(ego.heading), ego.speed * np.cos(ego.heading)
     may_reverse = not w.shielded and rng.random() < 0.3
     squeeze = rng.random() < 0.2
@@ -550,7 +567,7 @@ def episode(rng, w, result, film):
             if frame < len(film):
                 film[frame, 0], film[frame, 1 + i] = ego, cars[1 + i]
         a, slip = want(rng, ego, cars[1 + _below(rng, w.others)], danger)
-        slowest = -MAX_SPEED if may_reverse else 0.0
+        slowest = -MAX_SPEED if may_reverse or w.backs_up else 0.0
         command = Command(min(max(a, (slowest - ego.speed) / w.dt), (MAX_SPEED - ego.speed) / w.dt), slip)
         if w.shielded:
             command = _shielded(command, ego, seen[0], users, last, memory, w, result)
@@ -572,6 +589,8 @@ def episode(rng, w, result, film):
         course, heading = turn(ego, command.slip, w.dt)
         move(ego, command.acceleration, course, heading, w.dt)
         result.heading = max(result.heading, abs(ego.heading))
+        result.backed_up += ego.speed < 0.0
+        result.fastest_back = max(result.fastest_back, -ego.speed)
         for i in range(w.others):
             now, soon = contact(ego, cars[1 + i], w.dt)
             if now or soon:

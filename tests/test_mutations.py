@@ -37,6 +37,7 @@ MUTATIONS = {
     "C8 no room for predicted contact": (dict(rules=dict(overlap_margin=0.0)), FAST, 1, "broken"),
     "heading bound off": (dict(steering=dict(heading_bound=1.0)), FAST, 1, "heading"),
     "credit for receding, three cars": (dict(rules=dict(no_credit=False)), FAST, 2, "contact"),
+    "backs up whoever is behind": (dict(backs_up=True, backs_into=True), FAST, 1, "contact"),
     "no lateral duty": (dict(rules=dict(lateral=False, **LETTER)), FAST, 1, "contact"),
     "no longitudinal duty": (dict(rules=dict(longitudinal=False, **LETTER)), FAST, 1, "contact"),
 }

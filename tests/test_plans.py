@@ -248,7 +248,10 @@ def crowd(env_id, rng):
     threats["s"], threats["v"] = rng.uniform(0.0, 0.5 * paths.cells[threats["path"]]), rng.uniform(-1.0, 12.0, 10)
     threats["cap"], threats["half_length"], threats["wreck"] = roads.limit, 2.5, rng.random(10) < 0.1
     scene = Scene(paths, ego, threats, EGO, TABLE.other, DT)
-    sort_out(scene, np.zeros(10, CROSSING), CAUTIOUS)
+    memory, stands = np.zeros(10, CROSSING), rng.random(10) < 0.2
+    threats["v"][stands] = rng.uniform(-0.4, 0.45, stands.sum())
+    memory["stood"], memory["counted_on"] = 1000, rng.integers(60, size=10)
+    sort_out(scene, memory, CAUTIOUS)
     return scene
 
 

@@ -203,7 +203,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     wish = Command(acceleration, slip)
     response = Response(wish, False, False)
     if settings.overrides:
-        body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack)
+        body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack, car.kind == DIRECT)
         response = respond(wish, danger, ego, body, settings.rules, settings.dt)
         command, steered = response.command, steering
         if command.slip != wish.slip:
@@ -329,7 +329,7 @@ def _describe(car, choice, out):
         car.length,
         car.width,
     )
-    out.wreck = car.crashed or car.kind == OBSTACLE
+    out.wreck, out.alert = car.crashed or car.kind == OBSTACLE, False
     out.size, out.on, out.lane, out.choice = 0, car.lane, -1, -1  # all are of one size
     if car.kind == TRAFFIC or car.kind == META:
         out.lane, out.choice = car.target_lane, choice[car.route + 1, car.target_lane]

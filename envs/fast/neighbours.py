@@ -15,7 +15,7 @@ from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
 from envs.highway import Settings
 from envs.roads import reach_of, road_through
 from shield.compiled import rare
-from shield.controller import SAFE_BEYOND_DOUBT, may_be_next
+from shield.controller import beyond_doubt, may_be_next
 from shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
 from shield.lane_frame import look_ahead, same_frame, to_lane_frame
 from shield.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
@@ -146,7 +146,8 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     me.wreck, me.in_own_lane = False, True
     threshold = _look_over(cars, episode, ego, me, road, now, sight.x, settings, soonest)
     if not chosen:
-        _choose_near(episode, past, sight.x, max(min(threshold, nearest), SAFE_BEYOND_DOUBT) + _ROUNDING)
+        far = beyond_doubt(me.speed, settings.ego, dt)
+        _choose_near(episode, past, sight.x, max(min(threshold, nearest), far) + _ROUNDING)
     for a in range(episode.near):
         i = past.near[a]
         k = car_of(i, episode)
@@ -209,9 +210,7 @@ def _note(car, pose):
 
 @merged
 def _to_record(road, pose, before, box, dt, user):
-    to_lane_frame(
-        road, pose.x, pose.y, pose.heading, pose.speed, pose.cos, pose.sin, before.x, before.y, box, dt, user
-    )
+    to_lane_frame(road, pose.x, pose.y, pose.heading, pose.speed, pose.cos, pose.sin, before.x, before.y, box, dt, user)
 
 
 @merged
