@@ -160,8 +160,8 @@ def _simulator_on(name: str) -> Preset:
     return Preset(
         ego=on_road(_simulator(response_time=2 / 15), road),
         other=on_road(_simulator(response_time=1.0), road),
-        source=f"as simulator, on a {name} road: friction {road.low:g} to {road.high:g} "
-        "(Noon, Engineering Analysis of Vehicular Accidents, 1994); holds where everybody drives by it",
+        source=f"as simulator, where friction is {road.low:g} to {road.high:g} ({name}: Noon, Engineering Analysis of "
+        "Vehicular Accidents, 1994); counts where everybody drives by it",
         per_frame=True,
     )
 

@@ -104,7 +104,7 @@ def smallest_separation(ego, plan, other, horizon, step):
 
 @compiled
 def ends_safely(ego, plan, other, driver, other_driver, horizon):
-    """Is the pair out of danger when the plan ends (Def. 12.2)? One safe axis is enough (Def. 9), or an ego that stands."""
+    """Is the pair out of danger when the plan ends (Def. 12.2): one axis safe (Def. 9), or the ego at rest?"""
     x, v, y, u = follow(ego, plan, horizon)
     x_other, v_other = naive(other.x, other.v, other.a, horizon)
     y_other, u_other = naive(other.y, other.u, other.a_lat, horizon, True)

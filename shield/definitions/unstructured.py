@@ -203,6 +203,10 @@ class Bounds(NamedTuple):
     slack: float  # by which one may be ahead of the linear course of the extent        [m]
     detour: float  # farthest from its start at which one that sets out anew has stopped [m]
     turns_around: bool  # after which its box may point anywhere
+    cos: float  # of its heading
+    sin: float
+    diagonal: float  # half of its box's                                                [m]
+    corner: float  # angle between the heading and a corner                             [rad]
 
 
 class Occupancy(NamedTuple):
@@ -234,6 +238,10 @@ def occupy(mover, driver, steering, dt, braking, going_on):
         b * dt**2 / 8,
         0.5 * mover.v * rho if turns_around else 0.0,
         turns_around,
+        np.cos(mover.heading),
+        np.sin(mover.heading),
+        np.hypot(mover.half_length, mover.half_width),
+        np.arctan2(mover.half_width, mover.half_length),
     )
 
 
@@ -336,13 +344,12 @@ def _turn(t, side, mover, driver, steering, brakes):
 
 
 class _Side(NamedTuple):
-    """A direction as one road user sees it: relative to its heading [rad], in [-pi, pi)."""
+    """A direction as one road user sees it: angles relative to its heading [rad], in [-pi, pi)."""
 
-    angle: float
-    back: float  # the opposite one
-    right: float  # and those across
-    left: float
-    cos: float
+    angle: float  # of the direction
+    back: float  # of the opposite one
+    corners: tuple[float, float, float, float]  # to which it would have to turn for a corner to point there
+    cos: float  # of the angle
     sin: float
 
 
@@ -352,13 +359,20 @@ def _wrapped(angle):
 
 
 @inner
-def _side(heading, cos_heading, sin_heading, nx, ny):
-    cos, sin = nx * cos_heading + ny * sin_heading, ny * cos_heading - nx * sin_heading
+def _opposite(angle):
+    return angle - np.pi if angle >= 0.0 else angle + np.pi
+
+
+@inner
+def _side(occupancy, nx, ny):
+    x, y = occupancy.bounds.cos, occupancy.bounds.sin
+    cos, sin = nx * x + ny * y, ny * x - nx * y
     angle = np.arctan2(sin, cos)
-    back = angle - np.pi if angle > 0.0 else angle + np.pi
-    right = angle - 0.5 * np.pi if angle > -0.5 * np.pi else angle + 1.5 * np.pi
-    left = angle + 0.5 * np.pi if angle < 0.5 * np.pi else angle - 1.5 * np.pi
-    return _Side(angle, back, right, left, cos, sin)
+    front_right, front_left = angle - occupancy.bounds.corner, angle + occupancy.bounds.corner
+    front_right = front_right + 2 * np.pi if front_right < -np.pi else front_right
+    front_left = front_left - 2 * np.pi if front_left >= np.pi else front_left
+    corners = front_right, front_left, _opposite(front_right), _opposite(front_left)
+    return _Side(angle, _opposite(angle), corners, cos, sin)
 
 
 @inner
@@ -397,19 +411,15 @@ def _advance(row, side, cos):
 def _half_box(row, side, occupancy):
     """How far a box extends from its centre in a direction, at any heading of a step [m]."""
     length, width = occupancy.mover.half_length, occupancy.mover.half_width
-    if occupancy.bounds.turns_around:
-        return np.hypot(length, width)
-    at_right = side.cos * row[COS_RIGHT] + side.sin * row[SIN_RIGHT]
-    at_left = side.cos * row[COS_LEFT] - side.sin * row[SIN_LEFT]
-    cos = larger(np.abs(at_right), np.abs(at_left))
-    if _may_point(row, side.angle) or _may_point(row, side.back):
-        cos = 1.0
-    across_right = side.sin * row[COS_RIGHT] - side.cos * row[SIN_RIGHT]
-    across_left = side.sin * row[COS_LEFT] + side.cos * row[SIN_LEFT]
-    sin = larger(np.abs(across_right), np.abs(across_left))
-    if _may_point(row, side.right) or _may_point(row, side.left):
-        sin = 1.0
-    return length * cos + width * sin
+    front_right, front_left, rear_left, rear_right = side.corners
+    a_corner_may = _may_point(row, front_right) or _may_point(row, front_left)
+    if a_corner_may or _may_point(row, rear_left) or _may_point(row, rear_right) or occupancy.bounds.turns_around:
+        return occupancy.bounds.diagonal
+    at_right = length * np.abs(side.cos * row[COS_RIGHT] + side.sin * row[SIN_RIGHT])
+    at_right += width * np.abs(side.sin * row[COS_RIGHT] - side.cos * row[SIN_RIGHT])
+    at_left = length * np.abs(side.cos * row[COS_LEFT] - side.sin * row[SIN_LEFT])
+    at_left += width * np.abs(side.sin * row[COS_LEFT] + side.cos * row[SIN_LEFT])
+    return larger(at_right, at_left)
 
 
 @inner
@@ -430,8 +440,7 @@ def extent(occupancy, rows, k, nx, ny):
       rows: `occupancy.braking` or `occupancy.going_on`.
       nx, ny: the direction, a unit vector.
     """
-    mover = occupancy.mover
-    side = _side(mover.heading, np.cos(mover.heading), np.sin(mover.heading), nx, ny)
+    side = _side(occupancy, nx, ny)
     before = 0.0
     for j in range(k):
         before += _advance(rows[j], side, _largest_cos(rows[j], side))
@@ -445,7 +454,7 @@ def extent(occupancy, rows, k, nx, ny):
 def _steps_apart(one, rows_1, two, rows_2, nx, ny, steps, eps):
     """Bits of the steps in which two occupancies are more than `eps` apart in one direction, the second ahead."""
     first, second = one.mover, two.mover
-    side_1, side_2 = _sides(first, second, nx, ny)
+    side_1, side_2 = _side(one, nx, ny), _side(two, -nx, -ny)
     distance = (second.x - first.x) * nx + (second.y - first.y) * ny - one.bounds.slack - two.bounds.slack - eps
     reached_1, reached_2 = 0.0, 0.0
     apart = np.int64(0)
@@ -506,8 +515,8 @@ def drives_away(braker, goer, theta):
         return False
     nx, ny = dx / start, dy / start
     heading = _wrapped(second.heading - np.arctan2(ny, nx))
-    ahead, behind = _sides(first, second, nx, ny), _sides(first, second, -nx, -ny)
-    right, left = _sides(first, second, -ny, nx), _sides(first, second, ny, -nx)
+    ahead, behind = _sides(braker, goer, nx, ny), _sides(braker, goer, -nx, -ny)
+    right, left = _sides(braker, goer, -ny, nx), _sides(braker, goer, ny, -nx)
     near, far, low, high = start, start, 0.0, 0.0
     slack = braker.bounds.slack + goer.bounds.slack
     for k in range(steps):
@@ -529,10 +538,9 @@ def drives_away(braker, goer, theta):
 
 
 @inner
-def _sides(first, second, nx, ny):
+def _sides(one, two, nx, ny):
     """A direction as one road user sees it, and the opposite one as another does."""
-    side = _side(first.heading, np.cos(first.heading), np.sin(first.heading), nx, ny)
-    return side, _side(second.heading, np.cos(second.heading), np.sin(second.heading), -nx, -ny)
+    return _side(one, nx, ny), _side(two, -nx, -ny)
 
 
 @inner
@@ -565,8 +573,7 @@ def who_brakes(one, two, eps, theta):
     if steps > rows:
         return DANGEROUS  # nobody has looked far enough ahead
     distance = np.hypot(second.x - first.x, second.y - first.y)
-    discs = one.bounds.reach + two.bounds.reach + np.hypot(first.half_length, first.half_width)
-    if distance > discs + np.hypot(second.half_length, second.half_width) + eps:
+    if distance > one.bounds.reach + one.bounds.diagonal + two.bounds.reach + two.bounds.diagonal + eps:
         return BOTH_BRAKE
     apart = steps_apart(one, one.braking, two, two.braking, steps, eps)
     first_suffices = _suffices(one, two, apart, eps, theta)
@@ -588,25 +595,39 @@ def _suffices(braker, goer, apart, eps, theta):
 
 
 @compiled
-def proper_response(last, first_stands, second_stands, turn_1, turn_2):
-    """Def. 22: what both have to do while their distance is not safe, (of the first, of the second).
+def who_stays(last, first_stands, second_stands, turn_1, turn_2):
+    """Def. 22.1: once both have come to rest one may drive away, who has to turn less, and the other one stays.
 
     Args:
       last: `who_brakes` when it was safe last; DANGEROUS if it never was.
       first_stands, second_stands: is each at rest?
-      turn_1, turn_2: by how much each would have to turn to drive away, `turn_to_drive_away` [rad].
+      turn_1, turn_2: `turn_to_drive_away` of each [rad].
 
     Returns:
-      BRAKE: accelerate as C_b, that is brake once the response time is over. GO_ON: accelerate as C_f. DRIVE_AWAY: move
-      only within theta of the direction away from the other. STAY: keep standing.
+      What takes the place of `last` until it is safe again: FIRST_BRAKES if the first one stays. Else `last`.
+    """
+    if first_stands and second_stands and (last == BOTH_BRAKE or last == DANGEROUS):
+        return SECOND_BRAKES if turn_1 <= turn_2 else FIRST_BRAKES
+    return last
+
+
+@compiled
+def proper_response(last, first_stands, second_stands):
+    """Def. 22: what both have to do while their distance is not safe, (of the first, of the second).
+
+    Args:
+      last: `who_brakes` when it was safe last, or `who_stays`.
+      first_stands, second_stands: is each at rest?
+
+    Returns:
+      BRAKE: keep C_b, that is brake once the response time is over. GO_ON: keep C_f. DRIVE_AWAY: move only within theta
+      of the direction away from the other. STAY: keep standing.
     """
     if last == FIRST_BRAKES:
         return (STAY, DRIVE_AWAY) if first_stands else (BRAKE, GO_ON)
     if last == SECOND_BRAKES:
         return (DRIVE_AWAY, STAY) if second_stands else (GO_ON, BRAKE)
-    if first_stands and second_stands:
-        return (DRIVE_AWAY, STAY) if turn_1 <= turn_2 else (STAY, DRIVE_AWAY)
-    return BRAKE, BRAKE
+    return (STAY if first_stands else BRAKE), (STAY if second_stands else BRAKE)
 
 
 @compiled
