@@ -31,12 +31,13 @@ from shield.longitudinal import d_min_opposite_direction, d_min_same_direction
 from shield.params import PRESETS
 
 CAR = PRESETS["ad-rss"].ego
+QUICK = CAR._replace(response_time=0.4)
 WALKER = CAR._replace(response_time=0.5, a_max_accel=2.0, a_min_brake=2.0, a_max_brake=4.0, v_cap=10.0)
 STRAIGHT = VEHICLE._replace(yaw_acceleration=0.0)
 THETA = 1.0
 
 
-def verdict(one, two, driver_1=CAR, driver_2=CAR, steering=VEHICLE, eps=0.0, dt=0.1):
+def verdict(one, two, driver_1=QUICK, driver_2=QUICK, steering=VEHICLE, eps=0.0, dt=0.1):
     return who_brakes(occupied(one, driver_1, steering, dt), occupied(two, driver_2, steering, dt), eps, THETA)
 
 
@@ -59,7 +60,7 @@ def random_driver(rng):
         a_max_accel=rng.uniform(0.0, 4.0),
         a_min_brake=b,
         a_min_brake_correct=b,
-        a_max_brake=rng.uniform(2.0, 9.0),
+        a_max_brake=rng.uniform(b, 9.0),
     )
 
 
@@ -117,13 +118,16 @@ def test_head_on_the_safe_gap_is_that_of_def_2_and_both_brake():
 
 def pairs(rng, n, v_max=8.0):
     for _ in range(n):
-        angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(4.0, 35.0)
-        one = random_mover(rng, heading=rng.uniform(-np.pi, np.pi), v_max=v_max)
+        angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(4.0, 30.0)
+        heading, turned = rng.uniform(-np.pi, np.pi, 2)
+        if rng.random() < 0.5:  # one drives ahead of the other
+            angle, turned = heading + rng.normal(0.0, 0.1), rng.normal(0.0, 0.1)
+        one = random_mover(rng, heading=heading, v_max=v_max)
         place = distance * math.cos(angle), distance * math.sin(angle)
-        yield one, random_mover(rng, *place, rng.uniform(-np.pi, np.pi), v_max=v_max)
+        yield one, random_mover(rng, *place, heading + turned, v_max=v_max)
 
 
-def closest(one, two, drivers, steerings, answer, rng, n=300, dt=0.01):
+def closest(one, two, drivers, steerings, answer, rng, n=60, dt=0.02):
     """Smallest separation of random motions of a pair that keep to an answer of `who_brakes` [m]."""
     occupancies = [occupied(*user, 0.1) for user in zip((one, two), drivers, steerings, strict=True)]
     steps = [occupancy.bounds.steps for occupancy in occupancies]
@@ -139,8 +143,8 @@ def closest(one, two, drivers, steerings, answer, rng, n=300, dt=0.01):
 
 
 USERS = {
-    "two cars": ((CAR, CAR), (VEHICLE, VEHICLE)),
-    "two that change gear": ((CAR._replace(response_time=0.4),) * 2, (CHANGES_GEAR, CHANGES_GEAR)),
+    "two cars": ((QUICK, QUICK), (VEHICLE, VEHICLE)),
+    "two that change gear": ((QUICK, QUICK), (CHANGES_GEAR, CHANGES_GEAR)),
     "a car and a pedestrian": ((CAR, WALKER), (VEHICLE, PEDESTRIAN)),
 }
 
@@ -164,14 +168,14 @@ def test_pairs_that_are_safe_do_not_touch_whatever_they_do(users):
     assert BOTH_BRAKE in seen and (steerings[1] is PEDESTRIAN or {FIRST_BRAKES, SECOND_BRAKES} & set(seen))
 
 
-@pytest.mark.parametrize("really", [CAR._replace(response_time=1.4), CAR._replace(a_min_brake=3.0)])
+@pytest.mark.parametrize("really", [QUICK._replace(response_time=0.8), QUICK._replace(a_min_brake=2.5)])
 def test_pairs_of_worse_drivers_than_assumed_do_touch(really):
     rng = np.random.default_rng(4)
     smallest = np.inf
     for one, two in pairs(rng, 250):
         answer = verdict(one, two)
         if answer != DANGEROUS:
-            smallest = min(smallest, closest(one, two, (really, really), (VEHICLE, VEHICLE), answer, rng, n=100))
+            smallest = min(smallest, closest(one, two, (really, really), (VEHICLE, VEHICLE), answer, rng))
     assert smallest < 0.0
 
 
@@ -179,11 +183,11 @@ def test_most_of_what_is_called_dangerous_can_be_made_to_happen():
     # the bounds are from outside; they must not be so wide that nothing is ever safe
     rng = np.random.default_rng(5)
     dangerous, touched = 0, 0
-    for one, two in pairs(rng, 120):
+    for one, two in pairs(rng, 250):
         if verdict(one, two) == DANGEROUS:
             dangerous += 1
-            touched += closest(one, two, (CAR, CAR), (VEHICLE, VEHICLE), BOTH_BRAKE, rng, n=300) < 0.3
-    assert dangerous > 40 and touched > 0.5 * dangerous
+            touched += closest(one, two, (QUICK, QUICK), (VEHICLE, VEHICLE), BOTH_BRAKE, rng) < 0.3
+    assert dangerous > 30 and touched > 0.5 * dangerous
 
 
 # ---------------------------------------------------------------- what the definition implies
@@ -193,15 +197,13 @@ def test_who_brakes_does_not_depend_on_who_is_named_first_nor_on_the_frame():
     rng = np.random.default_rng(6)
     swapped = {FIRST_BRAKES: SECOND_BRAKES, SECOND_BRAKES: FIRST_BRAKES, BOTH_BRAKE: BOTH_BRAKE, DANGEROUS: DANGEROUS}
     seen = set()
-    for one, two in pairs(rng, 150):
+    for one, two in pairs(rng, 400):
         answer = verdict(one, two)
         assert verdict(two, one) == swapped[answer]
         turn, away = rng.uniform(-np.pi, np.pi), rng.uniform(-50.0, 50.0, 2)
         cos, sin = math.cos(turn), math.sin(turn)
         moved = [
-            m._replace(
-                x=cos * m.x - sin * m.y + away[0], y=sin * m.x + cos * m.y + away[1], heading=m.heading + turn
-            )
+            m._replace(x=cos * m.x - sin * m.y + away[0], y=sin * m.x + cos * m.y + away[1], heading=m.heading + turn)
             for m in (one, two)
         ]
         assert verdict(*moved) == answer
@@ -220,13 +222,13 @@ def test_safe_by_item_1_implies_safe_by_item_2():
         if answer in (FIRST_BRAKES, SECOND_BRAKES):
             by_item_1 += 1
             braker, goer = (one, two) if answer == FIRST_BRAKES else (two, one)
-            assert drives_away(occupied(braker, CAR, VEHICLE), occupied(goer, CAR, VEHICLE), THETA)
+            assert drives_away(occupied(braker, QUICK, VEHICLE), occupied(goer, QUICK, VEHICLE), THETA)
             # theta 0: nobody drives away for sure, which leaves item 2
-            assert who_brakes(occupied(one, CAR, VEHICLE), occupied(two, CAR, VEHICLE), 0.0, -1.0) in (
+            assert who_brakes(occupied(one, QUICK, VEHICLE), occupied(two, QUICK, VEHICLE), 0.0, -1.0) in (
                 BOTH_BRAKE,
                 DANGEROUS,
             )
-            assert closest(one, two, (CAR, CAR), (VEHICLE, VEHICLE), answer, rng, n=50) > 0.0
+            assert closest(one, two, (QUICK, QUICK), (VEHICLE, VEHICLE), answer, rng) > 0.0
     assert by_item_1 > 10
 
 
@@ -235,7 +237,7 @@ def test_a_wider_clearance_or_a_longer_response_never_makes_it_safer():
     lost = 0
     for one, two in pairs(rng, 150):
         answer = verdict(one, two)
-        for wider in (verdict(one, two, eps=3.0), verdict(one, two, CAR._replace(response_time=1.3))):
+        for wider in (verdict(one, two, eps=3.0), verdict(one, two, QUICK._replace(response_time=0.7))):
             assert answer != DANGEROUS or wider == DANGEROUS
             lost += wider == DANGEROUS != answer
     assert lost > 5
@@ -247,7 +249,7 @@ def test_a_car_that_passes_well_ahead_of_another_is_safe_from_it():
     creeping = Mover(0.0, 0.0, 0.0, 0.5, 0.0, 2.5, 1.0)
     slow = CAR._replace(response_time=0.2, a_max_accel=1.0)
     assert verdict(crossing, creeping, slow, slow) != DANGEROUS
-    assert verdict(crossing, creeping._replace(v=9.0), slow, slow) == DANGEROUS
+    assert verdict(crossing._replace(y=-12.0), creeping._replace(v=9.0), slow, slow) == DANGEROUS
 
 
 def test_who_has_not_looked_ahead_far_enough_is_in_danger():
@@ -305,7 +307,7 @@ def test_no_parked_pair_waits_forever():
     # nose to nose and side by side: one is told to drive away, and to where it can
     for x, y, heading in ((5.5, 0.0, np.pi), (0.0, 2.3, 0.0), (5.5, 0.0, 0.0)):
         one, two = Mover(0.0, 0.0, 0.0, 0.0, 0.0, 2.5, 1.0), Mover(x, y, heading, 0.0, 0.0, 2.5, 1.0)
-        assert verdict(one, two) == DANGEROUS
+        assert verdict(one, two, CAR, CAR) == DANGEROUS
         turns = (
             turn_to_drive_away(one.x, one.y, one.heading, x, y, THETA),
             turn_to_drive_away(x, y, heading, 0.0, 0.0, THETA),

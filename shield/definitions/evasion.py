@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shield.compiled import choose, compiled, compiled_for_arrays, inner, larger, smaller
-from shield.kinematics import reach, stopping_distance
-from shield.lateral import approach_no_credit, d_min_no_credit
+from shield.kinematics import reach, stopping_distance, travel
+from shield.lateral import d_min_no_credit
 from shield.longitudinal import d_min_longitudinal, is_safe_longitudinally
 
 
@@ -128,29 +128,34 @@ def ends_safely(ego, plan, other, driver, other_driver, horizon):
 def keeps_clear(ego, plan, third, driver, third_driver, horizon, step):
     """Def. 12.3: does a plan keep the proper response toward somebody else, whatever that does within its own?
 
-    At every time on the plan one axis is kept: the ego, which could still stop behind where the third may come to rest
-    at worst, or is ahead of where it may get; or the ego could still stop short of where it may come across.
+    At every time on the plan one axis is kept. Along: the ego is behind the third, which brakes hardest from the start
+    on, and could still stop behind it; or it is ahead, and the third, however far its response lets it get, could stop
+    behind an ego that brakes hardest then. Both compare gaps now and at rest, which suffices as long as nobody's
+    `a_min_brake` is above the other's `a_max_brake` (hole H1). Across: the ego, stopping its lateral motion, stays
+    clear of where the third may come.
 
     Args:
       ego, third: `Motion` of both; speeds along the lane >= 0.
       driver, third_driver: `RSSParams` of both.
     """
-    rho, b = driver.response_time, driver.a_min_brake
-    # where the third may be at last: braking hardest from now on, or as far as its response lets it get
-    nearest = third.x + stopping_distance(third.v, third_driver.a_max_brake) - third.half_length
-    farthest = reach(
-        third.v, third_driver.response_time, third_driver.a_max_accel, third_driver.a_min_brake, third_driver.v_cap
-    )
-    farthest += third.x + third.half_length
+    rho, a, b, v_cap = driver.response_time, driver.a_max_accel, driver.a_min_brake, driver.v_cap
+    its_rho, its_a, its_b = third_driver.response_time, third_driver.a_max_accel, third_driver.a_min_brake
+    half = ego.half_length + third.half_length
+    hardest = third.x + stopping_distance(third.v, third_driver.a_max_brake)
+    farthest = third.x + reach(third.v, its_rho, its_a, its_b, third_driver.v_cap)
     for k in range(int(horizon / step + 1e-9) + 1):
-        x, v, y, u = follow(ego, plan, k * step)
-        behind = x + ego.half_length + reach(v, rho, driver.a_max_accel, b, driver.v_cap) + driver.standstill_gap
-        ahead = x - ego.half_length + stopping_distance(v, driver.a_max_brake) - third_driver.standstill_gap
+        t = k * step
+        x, v, y, u = follow(ego, plan, t)
+        gap_behind = third.x + travel(t, third.v, 0.0, 0.0, third_driver.a_max_brake) - x - half
+        gap_behind = smaller(gap_behind, hardest - x - reach(v, rho, a, b, v_cap) - half - driver.standstill_gap)
+        gap_ahead = x - third.x - travel(t, third.v, its_rho, its_a, its_b, third_driver.v_cap) - half
+        stop = stopping_distance(v, driver.a_max_brake)
+        gap_ahead = smaller(gap_ahead, x + stop - farthest - half - third_driver.standstill_gap)
         side = 1.0 if third.y >= y else -1.0
         across = side * (third.y - y) - ego.half_width - third.half_width
-        mu = 0.5 * (driver.mu + third_driver.mu)
-        needed = mu + approach_no_credit(side * u, driver) + approach_no_credit(-side * third.u, third_driver)
-        if behind > nearest and ahead < farthest and across < needed:
+        if larger(gap_behind, gap_ahead) < 0.0 and across < d_min_no_credit(
+            side * u, -side * third.u, driver, third_driver
+        ):
             return False
     return True
 
