@@ -25,9 +25,9 @@ def bang_bang(rng, shape, low, high):
 
 
 def drive(mover, driver, steering, brakes, rng, n, seconds, dt=0.005):
-    """`n` random motions: any acceleration and turn for the response time, then C_b (`brakes`) or C_f, finely integrated.
+    """`n` random motions: any acceleration and turn for the response time, then C_b (`brakes`) or C_f.
 
-    Every driver changes its mind four times while it may, and every 0.4 s afterwards.
+    Finely integrated. Every driver changes its mind four times while it may, and every 0.4 s afterwards.
     """
     rho, a, b, b_max = driver.response_time, driver.a_max_accel, driver.a_min_brake, driver.a_max_brake
     frames = round(seconds / dt)

@@ -140,9 +140,7 @@ def test_the_family_of_manoeuvres_is_finite_and_within_the_limits():
 @pytest.mark.parametrize("complies", [False, True])
 @pytest.mark.parametrize("collides", [False, True])
 @pytest.mark.parametrize("way_out", [False, True])
-def test_an_evasion_is_owed_in_danger_if_others_fail_or_braking_does_not_suffice(
-    dangerous, complies, collides, way_out
-):
+def test_an_evasion_is_owed_in_danger_if_others_fail_or_braking_is_too_little(dangerous, complies, collides, way_out):
     owed = must_evade(dangerous, complies, collides, way_out)
     if not dangerous or not way_out or (complies and not collides):
         assert not owed

@@ -133,5 +133,5 @@ def test_too_few_steps_are_refused():
     with pytest.raises(ValueError, match=r"^dt = 0\.1 .* expected >= "):
         occupied(fast, CAR, VEHICLE, 0.1)
     occupied(fast, CAR, VEHICLE, 0.2)
-    with pytest.raises(ValueError, match="^steps = 80 .* expected 1 to 62"):
+    with pytest.raises(ValueError, match=r"^steps = 80 .* expected 1 to 62"):
         occupied(fast, CAR, VEHICLE, 0.2, 80)

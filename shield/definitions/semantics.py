@@ -19,6 +19,7 @@ S, V, Y, U, A = range(ROLLOUT_FIELDS)
 
 _SETTLING = 1.0  # in which a gap is closed          [s]
 _FOLLOWING = 0.5  # in which a speed is taken up     [s]
+_ROOM = 0.5  # left before a place with a speed      [m]
 
 
 class Limits(NamedTuple):
@@ -85,10 +86,21 @@ def _wanted_speed(s, v, t, goals, limits):
         else:
             ahead = s_other + goals.gap + goals.headway * goals.v_other
             wanted = smaller(wanted, goals.v_other + (ahead - s) / _SETTLING)
-    to_place = goals.s_place - s
-    if to_place >= 0.0 and to_place < np.inf:
-        wanted = smaller(wanted, np.sqrt(goals.v_place**2 + limits.a_brake * to_place))  # half the braking: it lags
+    if goals.s_place >= s:
+        wanted = smaller(wanted, np.sqrt(goals.v_place**2 + limits.a_brake * larger(goals.s_place - s - _ROOM, 0.0)))
     return larger(wanted, 0.0)
+
+
+@inner
+def _braking_before(s, v, goals, limits):
+    """Largest acceleration that still leads to the speed of a place ahead by even braking [m/s^2].
+
+    It counts from where a good part of the braking is needed.
+    """
+    if s > goals.s_place or v <= goals.v_place:
+        return np.inf
+    needed = (v**2 - goals.v_place**2) / (2 * larger(goals.s_place - s - _ROOM, 0.1 * _ROOM))
+    return -needed if needed > 0.4 * limits.a_brake else np.inf
 
 
 @compiled
@@ -105,16 +117,15 @@ def rollout(s, v, y, u, a, goals, limits, dt, out):
     """
     for k in range(len(out)):
         wanted = (_wanted_speed(s, v, k * dt, goals, limits) - v) / _FOLLOWING
+        wanted = smaller(wanted, _braking_before(s, v, goals, limits))
         wanted = smaller(larger(wanted, -limits.a_brake), limits.a_accel)
         a = smaller(larger(wanted, a - limits.jerk * dt), a + limits.jerk * dt)
         a = larger(a, -v / dt)  # nobody backs up
         s, v = s + v * dt + 0.5 * a * dt**2, v + a * dt
-        # as fast as allows to stop at the lateral goal
-        away = goals.y - y
-        a_lat, step = limits.a_lat, limits.a_lat * dt
-        fastest = np.sqrt(a_lat * (2 * np.abs(away) + 0.25 * a_lat * dt**2)) - 0.5 * step
-        u_wanted = np.sign(away) * smaller(fastest, np.abs(away) / dt)
-        u = smaller(larger(u_wanted, u - step), u + step)
+        # as fast as one can stop from at the lateral goal, or get there with one last step
+        away, step = np.abs(goals.y - y), limits.a_lat * dt
+        fastest = larger(np.sqrt(2 * limits.a_lat * away) - 0.5 * step, smaller(away / dt, step))
+        u = smaller(larger(np.sign(goals.y - y) * fastest, u - step), u + step)
         y += u * dt
         out[k, S], out[k, V], out[k, Y], out[k, U], out[k, A] = s, v, y, u, a
 

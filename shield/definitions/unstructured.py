@@ -606,7 +606,7 @@ def who_stays(last, first_stands, second_stands, turn_1, turn_2):
     Returns:
       What takes the place of `last` until it is safe again: FIRST_BRAKES if the first one stays. Else `last`.
     """
-    if first_stands and second_stands and (last == BOTH_BRAKE or last == DANGEROUS):
+    if first_stands and second_stands and last in (BOTH_BRAKE, DANGEROUS):
         return SECOND_BRAKES if turn_1 <= turn_2 else FIRST_BRAKES
     return last
 
