@@ -190,6 +190,35 @@ def test_most_of_what_is_called_dangerous_can_be_made_to_happen():
     assert dangerous > 30 and touched > 0.5 * dangerous
 
 
+def widest_angles(one, two, really, rng, n=100, dt=0.02):
+    """(smallest theta with which the second surely drives away, widest angle of random motions [rad]) at any stop."""
+    braker, goer = occupied(one, QUICK, VEHICLE), occupied(two, QUICK, VEHICLE)
+    if not drives_away(braker, goer, 2.0):
+        return None
+    low, high = 0.0, 2.0
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if drives_away(braker, goer, middle) else (middle, high)
+    until = braker.bounds.steps * 0.1
+    first = drive(one, QUICK, VEHICLE, True, rng, n, until, dt)
+    second = drive(two, QUICK, really, False, rng, n, until, dt)
+    angle = np.abs(np.remainder(second.heading - np.arctan2(second.y - first.y, second.x - first.x) + np.pi, 2 * np.pi))
+    return high, np.abs(angle - np.pi)[first.time >= one.v / QUICK.a_max_brake].max()
+
+
+@pytest.mark.parametrize(("really", "holds"), [(VEHICLE, True), (VEHICLE._replace(yaw_acceleration=2.0), False)])
+def test_who_surely_drives_away_does_so_whatever_both_do(really, holds):
+    rng = np.random.default_rng(10)
+    within, near = [], 0
+    for one, two in pairs(rng, 250):
+        angles = widest_angles(one, two, really, rng)
+        if angles is not None:
+            within.append(angles[1] <= angles[0] + 1e-3)
+            near += angles[1] > 0.5 * angles[0]
+    assert len(within) > 15 and all(within) == holds
+    assert near > 0.5 * len(within)  # and the bound is no idle one
+
+
 # ---------------------------------------------------------------- what the definition implies
 
 
