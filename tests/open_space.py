@@ -53,7 +53,7 @@ def drive(mover, driver, steering, brakes, rng, n, seconds, dt=0.005):
         else:
             if curvature is None:
                 moves = (np.abs(v) > 1e-12) & steering.keeps_turning
-                curvature = np.where(moves, w / np.where(moves, v, 1.0), 0.0)
+                curvature = np.where(moves, np.clip(w / np.where(moves, v, 1.0), -limit, limit), 0.0)
             if brakes:
                 push = -b if k % round(0.4 / dt) else bang_bang(rng, n, -b_max, -b)
             elif k % round(0.4 / dt) == 0:
