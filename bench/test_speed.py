@@ -2,12 +2,14 @@
 
 import time
 
+import numba
 import numpy as np
 import pytest
 
 from envs import make
 from envs.highway import ShieldedEgo
 from shield import PRESETS, d_min_lateral, d_min_opposite_direction, d_min_same_direction
+from shield.definitions.unstructured import DANGEROUS, ROW_FIELDS, VEHICLE, Mover, Occupancy, occupy, who_brakes
 from shield.risk import RiskSettings, marking, road_users, scene_risk
 
 PAIRS = 10_000
@@ -100,3 +102,55 @@ def test_one_distance_from_python(benchmark):
     benchmark(d_min_same_direction, 25.0, 20.0, ego, other)
     if benchmark.stats:
         print(f"\nd_min_same_direction, one pair from Python: {1e6 * benchmark.stats.stats.median:.1f} us per call")
+
+
+# from far apart to crossing: pairs whose discs meet, so that directions are looked at; some safe, some not
+SCENES = [
+    Mover(16.0, 0.0, 0.0, 5.0, 0.0, 2.5, 1.0),
+    Mover(33.0, 0.0, 0.0, 5.0, 0.0, 2.5, 1.0),
+    Mover(28.0, 3.0, 3.0, 4.0, 0.0, 2.5, 1.0),
+    Mover(14.0, 9.0, -2.0, 3.0, 0.0, 2.5, 1.0),
+]
+EGO = Mover(0.0, 0.0, 0.0, 5.0, 0.0, 2.5, 1.0)
+
+
+@numba.njit
+def open_space_pairs(times, ego, other, driver, steering, rows):
+    """From two states to the answer of Def. 22, again and again; how often it was "dangerous"."""
+    dangerous = 0
+    for k in range(times):
+        moved = Mover(ego.x + 1e-9 * k, ego.y, ego.heading, ego.v, ego.yaw_rate, ego.half_length, ego.half_width)
+        bounds_1 = occupy(moved, driver, steering, 0.1, rows[0], rows[1])
+        bounds_2 = occupy(other, driver, steering, 0.1, rows[2], rows[3])
+        one = Occupancy(moved, bounds_1, rows[0], rows[1])
+        dangerous += who_brakes(one, Occupancy(other, bounds_2, rows[2], rows[3]), 0.0, 1.0) == DANGEROUS
+    return dangerous
+
+
+def test_one_pair_in_open_space(benchmark):
+    driver, rows, times = PRESETS["ad-rss"].ego, np.zeros((4, 40, ROW_FIELDS)), 200
+
+    def check():
+        return [open_space_pairs(times, EGO, other, driver, VEHICLE, rows) for other in SCENES]
+
+    answers = check()
+    assert 0 < sum(answer > 0 for answer in answers) < len(SCENES)
+    benchmark(check)
+    if benchmark.stats:
+        each = 1e6 * benchmark.stats.stats.median / times / len(SCENES)
+        print(f"\nopen space, one pair from two states: {each:.1f} us on average of {len(SCENES)} scenes")
+
+
+def test_one_pair_in_open_space_with_ad_rss(benchmark):
+    adrss = pytest.importorskip("tests.adrss_objects", reason="install the extra 'oracle'")
+    car = PRESETS["ad-rss"].ego
+    pairs = [adrss.open_space_pair(car, EGO, other) for other in SCENES]
+
+    def check():
+        return [adrss.judge_open_space(pair) for pair in pairs]
+
+    check()
+    benchmark.pedantic(check, rounds=5)
+    if benchmark.stats:
+        each = 1e6 * benchmark.stats.stats.median / len(SCENES)
+        print(f"\nad-rss, the same pairs: {each:.0f} us per call")

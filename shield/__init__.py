@@ -2,16 +2,19 @@
 
 from shield.lateral import d_min_lateral, mu_lateral_velocity
 from shield.longitudinal import d_min_longitudinal, d_min_opposite_direction, d_min_same_direction
-from shield.params import PRESETS, Preset, RSSParams, Rules
+from shield.params import PRESETS, ROADS, Preset, Road, RSSParams, Rules, on_road
 
 __all__ = [
     "PRESETS",
+    "ROADS",
     "Preset",
     "RSSParams",
+    "Road",
     "Rules",
     "d_min_lateral",
     "d_min_longitudinal",
     "d_min_opposite_direction",
     "d_min_same_direction",
     "mu_lateral_velocity",
+    "on_road",
 ]

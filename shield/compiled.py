@@ -21,7 +21,7 @@ take_as_they_are()
 def fingerprint(*more: Path) -> str:
     """A text that changes with every source file of this package, and with the files named."""
     digest = sha256()
-    for source in sorted({*Path(__file__).parent.glob("*.py"), *more}):
+    for source in sorted({*Path(__file__).parent.rglob("*.py"), *more}):
         digest.update(source.name.encode() + source.read_bytes())
     return digest.hexdigest()
 

@@ -119,6 +119,53 @@ def _simulator(response_time: float, a_max_accel: float = 3.0) -> RSSParams:
     )
 
 
+class Road(NamedTuple):
+    """Friction between tyres and a road [1]: at least, which is to be relied on, and at most, which is to be feared."""
+
+    low: float
+    high: float
+
+
+# Noon, "Engineering Analysis of Vehicular Accidents", CRC Press 1994: asphalt to concrete; dry and wet, snow and ice
+ROADS = {"dry": Road(0.65, 0.75), "wet": Road(0.50, 0.60), "snow": Road(0.20, 0.25), "ice": Road(0.10, 0.15)}
+GRAVITY = 9.81  # [m/s^2]
+
+
+def on_road(params: RSSParams, road: Road) -> RSSParams:
+    """What the same driver is assumed to do on a road of this friction.
+
+    Nobody accelerates or brakes harder than the road admits at best. Braking that is relied on is what it admits at
+    worst, along and across at once: the tyres share their grip, so both shrink alike until b^2 + b_lat^2 fits in it
+    (hole H13).
+
+    Raises:
+      ValueError: friction that is not positive, or more at least than at most.
+    """
+    if not 0.0 < road.low <= road.high < math.inf:
+        raise ValueError(f"friction = {tuple(road)} is out of range: expected 0 < low <= high, both finite")
+    relied, feared = road.low * GRAVITY, road.high * GRAVITY
+    share = min(1.0, relied / math.hypot(params.a_min_brake, params.a_lat_min_brake))
+    return params._replace(
+        a_max_accel=min(params.a_max_accel, feared),
+        a_min_brake=share * params.a_min_brake,
+        a_max_brake=min(params.a_max_brake, feared),
+        a_min_brake_correct=min(params.a_min_brake_correct, share * params.a_min_brake),
+        a_lat_max_accel=min(params.a_lat_max_accel, feared),
+        a_lat_min_brake=share * params.a_lat_min_brake,
+    )
+
+
+def _simulator_on(name: str) -> Preset:
+    road = ROADS[name]
+    return Preset(
+        ego=on_road(_simulator(response_time=2 / 15), road),
+        other=on_road(_simulator(response_time=1.0), road),
+        source=f"as simulator, where friction is {road.low:g} to {road.high:g} ({name}: Noon, Engineering Analysis of "
+        "Vehicular Accidents, 1994); counts where everybody drives by it",
+        per_frame=True,
+    )
+
+
 def _both(params: RSSParams, source: str) -> Preset:
     return Preset(params, params, source)
 
@@ -181,6 +228,7 @@ PRESETS: dict[str, Preset] = {
         ),
         source="Rodionova et al., IEEE IV 2020 (9304756), mined in CARLA, 'assertive'",
     ),
+    **{name: _simulator_on(name) for name in ROADS},
 }
 
 

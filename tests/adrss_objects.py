@@ -50,3 +50,33 @@ def become(one, params, lon=0.0, lat=0.0):
     velocity.speed_lon_min = velocity.speed_lon_max = physics.Speed(lon)
     velocity.speed_lat_min = velocity.speed_lat_max = physics.Speed(lat)
     return one
+
+
+def open_space_pair(params, ego, other):
+    """A pair of road users in open space (of `shield.definitions.unstructured.Mover`) as the library wants it."""
+    pair = rss.core.RelativeConstellation()
+    pair.constellation_id, pair.ego_id, pair.object_id = 1, 1, 2
+    pair.constellation_type = rss.world.ConstellationType.Unstructured
+    states = []
+    for mover, kind in ((ego, rss.world.ObjectType.EgoVehicle), (other, rss.world.ObjectType.OtherVehicle)):
+        one = become(new_object(), params, lon=mover.v)
+        one.object_type = kind
+        box = one.unstructured_object_state
+        box.yaw, box.steering_angle = physics.Angle(mover.heading), physics.Angle(0.0)
+        box.yaw_rate = physics.AngularVelocity(mover.yaw_rate)
+        box.dimension.length = physics.Distance(2 * mover.half_length)
+        box.dimension.width = physics.Distance(2 * mover.half_width)
+        box.center_point.x, box.center_point.y = physics.Distance(mover.x), physics.Distance(mover.y)
+        box.speed_range.minimum = box.speed_range.maximum = physics.Speed(mover.v)
+        states.append(one)
+    pair.ego_state, pair.other_state = states
+    return pair
+
+
+def judge_open_space(pair):
+    """Whether the library calls a pair in open space safe, looked at for the first time."""
+    state = rss.state.RssState()
+    checker = rss.unstructured.RssUnstructuredConstellationChecker()
+    information = rss.state.UnstructuredConstellationStateInformation()
+    assert checker.calculateRssStateUnstructured(1, pair, information, state)
+    return state.unstructured_constellation_state.is_safe

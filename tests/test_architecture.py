@@ -2,6 +2,7 @@
 
 import ast
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,32 @@ def imported_packages(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom):
             found.add(path.relative_to(ROOT).parts[0] if node.level else (node.module or "").split(".")[0])
     return found - set(sys.stdlib_module_names)
+
+
+# what definitions may import of the shield: each other, some of which stand outside their folder
+DEFINITIONS = {"compiled", "definitions", "kinematics", "lateral", "longitudinal", "params"}
+
+
+def imported_from_shield(path: Path) -> set[str]:
+    """Modules of the shield that a module imports by name."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add(node.module or "")
+    return {name.split(".")[1] if "." in name else name for name in found if name.split(".")[0] == "shield"}
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "shield" / "definitions").glob("*.py")), ids=lambda path: path.name)
+def test_definitions_are_leaves(path):
+    assert imported_from_shield(path) <= DEFINITIONS
+
+
+def test_every_package_is_installed():
+    packages = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    folders = {path.parent.relative_to(ROOT).as_posix().replace("/", ".") for path in MODULES}
+    assert set(packages) == folders
 
 
 def test_every_package_has_modules():

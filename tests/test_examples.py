@@ -14,6 +14,29 @@ import pytest
 
 from shield.blame import VERDICTS, judge_contact, judge_frame
 from shield.command import Command
+from shield.definitions.evasion import Motion, Plan, is_within_limits, naive, smallest_separation
+from shield.definitions.occlusion import is_exonerated_by_mean_speed, mean_speed_until_contact, v_visible
+from shield.definitions.pedestrians import Walk, reach_ahead
+from shield.definitions.sensing import (
+    accuracy_for,
+    braking_before,
+    decisions_to_see,
+    failure_rate_for,
+    joint_failure_bound,
+    joint_miss_bound,
+    longitudinal_error,
+    relative_error,
+    semantic_position,
+)
+from shield.definitions.unstructured import (
+    VEHICLE,
+    Mover,
+    angle_away,
+    do_not_collide,
+    first_contact,
+    stopping_sample,
+    trajectory,
+)
 from shield.geometry import half_extents, locate, make_road
 from shield.kinematics import forward_reach, reach, stopping_distance
 from shield.lateral import approach_no_credit, d_min_lateral, mu_lateral_velocity
@@ -57,18 +80,6 @@ EXAMPLES = json.loads((Path(__file__).parent / "data" / "rss-examples.json").rea
 
 OUT_OF_SCOPE = {
     "lemma1": "statistics of validation, no function of the shield",
-    "def11_naive": "evasive manoeuvres (Defs. 11 to 13) are not implemented",
-    "def12_evasive": "evasive manoeuvres (Defs. 11 to 13) are not implemented",
-    "def20": "unstructured roads (Defs. 19 to 22) are not implemented",
-    "def21_brake_endpoint": "unstructured roads (Defs. 19 to 22) are not implemented",
-    "pedestrian_reach": "pedestrians are not implemented",
-    "occlusion_speed": "occlusion (Defs. 23 to 26) is not implemented",
-    "occlusion_legacy_mean_speed": "occlusion (Defs. 23 to 26) is not implemented",
-    "pac_relative_error": "sensing (Defs. 28 to 32) is not implemented",
-    "pac_lipschitz": "sensing (Defs. 28 to 32) is not implemented",
-    "corollary3": "sensing (Defs. 28 to 32) is not implemented",
-    "corollary3_forward": "sensing (Defs. 28 to 32) is not implemented",
-    "def30_error": "sensing (Defs. 28 to 32) is not implemented",
     "p_controller_stop": "the shield brakes directly, never through a speed controller",
     "lane_change_time": "planning of lane changes belongs to the agent",
     "steering_for_lateral_speed": "the shield bounds lateral speed and heading together instead of inverting one",
@@ -281,7 +292,100 @@ def def29_semantic(x, y):
     # lateral values are lane widths of 4 m, positive outward; here metres, positive to the right, which is inward
     circle = make_road([[50.0, 0.0, np.pi / 2, 1 / 50, 50.0 * np.pi, 0.0]])
     s, lateral, _, _ = locate(circle, float(x), float(y))
-    return [s, -lateral / 4.0]
+    return list(semantic_position(s, -lateral, 4.0))
+
+
+# ---------------------------------------------------------------- evasion
+
+
+def def11_naive(p, v, a, t):
+    return list(naive(float(p), float(v), float(a), float(t)))
+
+
+def def12_evasive(plan, other):
+    plan = {
+        "keep going": Plan(0.0, 0.0, 0.0),
+        "brake 4": Plan(-4.0, 0.0, 0.0),
+        "brake 6": Plan(-6.0, 0.0, 0.0),
+        "swerve 2 m/s2 for 1.25 s": Plan(0.0, 2.0, 1.25),
+        "swerve 3 m/s2 for 1 s + brake 2": Plan(-2.0, 3.0, 1.0),
+    }[plan]
+    ego = Motion(0.0, 20.0, 0.0, 0.0, 0.0, 0.0, 2.5, 1.0)
+    x, v, a, y, vy = (float(other[name]) for name in ("x", "v", "a", "y", "vy"))
+    separation = smallest_separation(ego, plan, Motion(x, v, a, y, vy, 0.0, 2.5, 1.0), 4.0, 0.01)
+    return {"within_limits": is_within_limits(plan, CAR, 3.0, 8.0), "min_sep": separation, "avoids": separation >= 0.0}
+
+
+# ---------------------------------------------------------------- open space, pedestrians
+
+
+def on_circle(s):
+    """`[T, 3]` on a circle of circumference 200 m, by arc length."""
+    angle = np.pi * s / 100.0
+    radius = 100.0 / np.pi
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), angle + np.pi / 2])
+
+
+def def20(lead):
+    time = np.linspace(0.0, 25.0, 2501)
+    braking = np.minimum(time, 2.5)
+    one, two = on_circle(10.0 * braking - 2.0 * braking**2), on_circle(lead + 10.0 * time)
+    stop = stopping_sample(np.maximum(10.0 - 4.0 * time, 0.0))
+    (x_1, y_1, _), (x_2, y_2, heading) = one[stop], two[stop]
+    eps, theta, never = 1e-8, np.pi / 4, len(time)
+    return {
+        "chord_at_ts1": math.hypot(x_2 - x_1, y_2 - y_1),
+        "angle": angle_away(x_1, y_1, x_2, y_2, heading),
+        "tau1&tau2_empty": do_not_collide(time, one, two, stop, never, eps, theta),
+        "tau2&tau1_empty": do_not_collide(time, two, one, never, stop, eps, theta),
+        "time_c2_hits_stopped_c1": first_contact(time, one, two, eps),
+    }
+
+
+def def21_brake_endpoint(v, hdd):
+    mover = Mover(0.0, 0.0, 0.0, float(v), 0.0, 2.5, 1.0)
+    x, y, _, speed = trajectory(60.0, mover, CAR, VEHICLE, CAR.a_max_accel, float(hdd), CAR.a_min_brake)
+    assert speed == 0.0
+    return [x, y]
+
+
+def pedestrian_reach(v, rho, a, b):
+    return reach_ahead(v, Walk(rho, float(a), float(b)))
+
+
+# ---------------------------------------------------------------- occlusion, sensing
+
+
+def occlusion_speed(D, a_acc):
+    return v_visible(float(D), 1.0, a_acc, 4.0)
+
+
+def occlusion_legacy_mean_speed(v, t_hit):
+    return {
+        "mean_car_speed": mean_speed_until_contact(float(v), t_hit, 1.0, 4.0),
+        "exonerated": is_exonerated_by_mean_speed(float(v), t_hit, 1.0, 4.0, 10 / 3.6),
+    }
+
+
+def pac_relative_error(v, d, err):
+    return {"decel": braking_before(v, d), "relative_error": relative_error(err, d)}
+
+
+def def30_error(p, ph):
+    return longitudinal_error(p, ph)
+
+
+def pac_lipschitz(L, eps):
+    return accuracy_for(eps, L)
+
+
+def corollary3(c, target):
+    p = failure_rate_for(target, c)
+    return {"p": p, "inv_p": decisions_to_see(p)}
+
+
+def corollary3_forward(p, c):
+    return {"both": joint_failure_bound(p, c), "miss_only": joint_miss_bound(p, c)}
 
 
 # ---------------------------------------------------------------- blame

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eval.stats import bootstrap_mean, bootstrap_median, paired_difference, wilson
+from eval.stats import bootstrap_mean, bootstrap_median, clopper_pearson, paired_difference, wilson
 
 # Newcombe (1998), Statistics in Medicine 17:857-872, Table I, method 3 (Wilson, uncorrected).
 NEWCOMBE = [
@@ -25,6 +25,27 @@ def test_wilson_gives_the_published_intervals(k, n, low, high):
     assert interval.n == n
     assert interval.low == pytest.approx(low, abs=5e-5)
     assert interval.high == pytest.approx(high, abs=5e-5)
+
+
+# the same rows of Newcombe's Table I, method 5 (Clopper-Pearson)
+EXACT = [(81, 263, 0.2527, 0.3676), (15, 148, 0.0578, 0.1617), (0, 20, 0.0000, 0.1684), (1, 29, 0.0009, 0.1776)]
+
+
+@pytest.mark.parametrize(("k", "n", "low", "high"), EXACT)
+def test_clopper_pearson_gives_the_published_intervals(k, n, low, high):
+    interval = clopper_pearson(k, n)
+    assert interval.value == k / n and interval.n == n
+    assert interval.low == pytest.approx(low, abs=5e-5)
+    assert interval.high == pytest.approx(high, abs=5e-5)
+
+
+def test_clopper_pearson_of_no_success_solves_its_own_equation():
+    # (1 - p)^n = alpha / 2
+    assert clopper_pearson(0, 100).high == pytest.approx(1 - 0.025 ** (1 / 100))
+    assert clopper_pearson(100, 100).low == pytest.approx(0.025 ** (1 / 100))
+    assert (clopper_pearson(0, 0).low, clopper_pearson(0, 0).high) == (0.0, 1.0)
+    with pytest.raises(ValueError, match="k = 3"):
+        clopper_pearson(3, 2)
 
 
 def test_wilson_of_no_success_ends_at_z_squared_over_n_plus_z_squared():
