@@ -57,7 +57,7 @@ def road_through(
     ahead, around = _explore(network, index, reach, True, way)
     order = {lane: stretch for lane, stretch in reversed(behind.items()) if lane not in ahead} | ahead
     for other in beside:
-        order = order | {lane: it for lane, it in _explore(network, other, reach, True, ())[0].items() if lane not in order}
+        order = order | _explore(network, other, reach, True, ())[0] | order  # in this order, as they are known so far
     road = make_road([row for stretch in order.values() for row in _rows(stretch)])
     ends = np.cumsum([len(stretch.pieces) for stretch in order.values()])
     last = dict(zip(order, ends - 1, strict=True))
@@ -130,9 +130,7 @@ def _without_ends(found: dict[LaneIndex, _Stretch]) -> dict[LaneIndex, _Stretch]
     return found
 
 
-def _links(
-    network: Any, index: LaneIndex, shift: float, forward: bool, way: Way
-) -> list[tuple[LaneIndex, float, Way]]:
+def _links(network: Any, index: LaneIndex, shift: float, forward: bool, way: Way) -> list[tuple[LaneIndex, float, Way]]:
     """Lanes that continue a lane (or lead to it), with the shift of the road on them and the way after them.
 
     Those that continue it without a jump, or else the nearest: the lane ends, and the road goes on beside it.
@@ -176,7 +174,9 @@ def _pieces_of(lane: Any, shift: float = 0.0) -> list[tuple[float, ...]]:
         curvature = (1.0 if lane.clockwise else -1.0) / lane.radius
         scale = max(1.0 - curvature * shift, 1e-3)
         return [(x, y, heading, curvature / scale, lane.length * scale)]
-    corners = np.array([lane.position(s, shift) for s in np.linspace(0.0, lane.length, int(lane.length // _SAMPLE) + 2)])
+    corners = np.array(
+        [lane.position(s, shift) for s in np.linspace(0.0, lane.length, int(lane.length // _SAMPLE) + 2)]
+    )
     steps = np.diff(corners, axis=0)
     return [
         (x, y, np.arctan2(dy, dx), 0.0, np.hypot(dx, dy)) for (x, y), (dx, dy) in zip(corners[:-1], steps, strict=True)

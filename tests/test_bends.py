@@ -151,7 +151,9 @@ def meet(kind, radius, turn, pieces, lane, gap, speed, faster=0.0, overrides=Tru
     road = Road(build(shape, lanes=2), np_random=np.random.default_rng(0))
     mine = road.network.get_lane(("0", "1", lane))
     at = min(20.0, mine.length - 1.0)
-    vehicle = MDPVehicle(road, mine.position(at, 0), mine.heading_at(at), speed, target_speeds=[speed - 1, speed, speed + 1])
+    vehicle = MDPVehicle(
+        road, mine.position(at, 0), mine.heading_at(at), speed, target_speeds=[speed - 1, speed, speed + 1]
+    )
     theirs = road.network.get_lane(("0", "1", lane if kind is Tailgater else 1 - lane))
     other = kind(road, theirs.position(at + gap, 0), theirs.heading_at(at + gap), speed + faster)
     road.vehicles += [vehicle, other]

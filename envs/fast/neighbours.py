@@ -209,9 +209,7 @@ def _note(car, pose):
 
 @merged
 def _to_record(road, pose, before, box, dt, user):
-    to_lane_frame(
-        road, pose.x, pose.y, pose.heading, pose.speed, pose.cos, pose.sin, before.x, before.y, box, dt, user
-    )
+    to_lane_frame(road, pose.x, pose.y, pose.heading, pose.speed, pose.cos, pose.sin, before.x, before.y, box, dt, user)
 
 
 @merged
