@@ -85,9 +85,8 @@ def lane_beside(start: Pose, element: Element, offset: float, reverse: bool = Fa
     phase = heading - turn * np.pi / 2
     phases = phase, phase + kappa * length
     radius = 1.0 / abs(kappa) - turn * offset
-    return CircularLane(
-        centre, radius, *(phases[::-1] if reverse else phases), bool(turn > 0) != reverse, speed_limit=30
-    )
+    begin, end = phases[::-1] if reverse else phases
+    return CircularLane(centre, radius, begin, end, bool(turn > 0) != reverse, speed_limit=30)
 
 
 def draw_bend(rng: np.random.Generator, turn: int, lanes: int, oncoming: int, angle: float) -> Element:
@@ -105,15 +104,10 @@ def draw_ring(rng: np.random.Generator, lanes: int, oncoming: int) -> list[Eleme
     corners = [draw_bend(rng, turn, lanes, oncoming, np.pi / 2) for _ in range(4)]
     radii = [1 / abs(corner.curvature) for corner in corners]
     long, wide = (max(radii[i] + radii[i + 1], radii[i - 2] + radii[i - 1]) + rng.uniform(5, 80) for i in (0, 1))
-    sides = (
-        long - radii[0] - radii[1],
-        wide - radii[1] - radii[2],
-        long - radii[2] - radii[3],
-        wide - radii[3] - radii[0],
-    )
     elements = []
-    for side, corner in zip(sides, [*corners[1:], corners[0]], strict=True):
-        elements += [Element(0.0, side), corner]
+    for i in range(4):
+        side = (long, wide, long, wide)[i] - radii[i] - radii[(i + 1) % 4]
+        elements += [Element(0.0, side), corners[(i + 1) % 4]]
     return elements
 
 
@@ -171,15 +165,14 @@ def draw_plan(rng: np.random.Generator, kind: str) -> Plan:
         longest = max(longest, 700.0 * (lanes + oncoming) / _LANES)
         pieces = cut(rng, draw_line(rng, 600.0, lanes, oncoming), longest)
         changes = rng.random() < 0.3 and not oncoming
-        counts = [
-            lanes if i < len(pieces) / 2 or not changes else int(rng.integers(1, lanes + 1)) for i in range(len(pieces))
-        ]
+        few = int(rng.integers(1, lanes + 1)) if changes else lanes
+        counts = [lanes if i < len(pieces) / 2 else few for i in range(len(pieces))]
         way = _sections(pieces, start, counts, "")
         return Plan(kind, way, way, oncoming, way[-1].end if rng.random() < 0.7 else None)
     longest = max(longest, 1200.0 * lanes / _LANES)
     trunk = _sections(cut(rng, draw_line(rng, rng.uniform(160, 260), lanes, 0), longest), start, [lanes] * 1000, "")
     fork = advance(trunk[-1].start, trunk[-1].element)
-    branches = []
+    branches: list[list[Section]] = []
     for turn in rng.permutation([-1, 0, 1])[: int(rng.integers(2, 4))]:
         bend = draw_bend(rng, int(turn) or 1, lanes, 0, rng.uniform(0.5, 1.3))
         elements = [bend, Element(0.0, 250.0)] if turn else [Element(0.0, 350.0)]
@@ -249,7 +242,7 @@ class RandomRoads(HighwayEnv):
             if driver is not None:
                 driver.randomize_behavior()
         if rng.random() < 0.6:
-            behind = rng.uniform(_CLEAR[0], 140.0)
+            behind = rng.uniform(80.0, 160.0)
             self._place(Tailgater, here - behind, speed + rng.uniform(0.0, 10.0), ego.lane_index[2])
         for _ in range(int(rng.integers(3))):
             self._place(Vehicle, here + rng.uniform(_CLEAR[1], 300.0), 0.0)

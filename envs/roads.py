@@ -57,9 +57,7 @@ def road_through(
     ahead, around = _explore(network, index, reach, True, way)
     order = {lane: stretch for lane, stretch in reversed(behind.items()) if lane not in ahead} | ahead
     for other in beside:
-        order = order | {
-            lane: it for lane, it in _explore(network, other, reach, True, ())[0].items() if lane not in order
-        }
+        order = order | _explore(network, other, reach, True, ())[0] | order  # in this order, as they are known so far
     road = make_road([row for stretch in order.values() for row in _rows(stretch)])
     ends = np.cumsum([len(stretch.pieces) for stretch in order.values()])
     last = dict(zip(order, ends - 1, strict=True))

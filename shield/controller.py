@@ -269,7 +269,7 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     permitted = _is_permitted(psi + slip, psi_next, body.slack, v, v_next, drift, bounds, rules)
     if permitted and abs(slip) <= body.max_slip:
         return slip
-    neutral = _straightening_slip(psi, turned, drift, gain, v, bounds)
+    neutral = _straightening_slip(psi, turned, drift, gain, v, v_next, bounds)
 
     # lateral speed of this frame: -left <= v sin(psi + slip) - drift <= right
     low = min(_arcsin((-bounds.left + drift) / v) - psi, neutral)
@@ -325,7 +325,7 @@ def _is_permitted(course, psi_next, slack, v, v_next, drift, bounds, rules):
 
 
 @inner
-def _straightening_slip(psi, turned, drift, gain, v, bounds):
+def _straightening_slip(psi, turned, drift, gain, v, v_next, bounds):
     """Slip that ends the sideways motion [rad].
 
     For G <= 1 the lateral speed itself is set to 0 and the heading follows by the factor 1 - G.
@@ -334,7 +334,7 @@ def _straightening_slip(psi, turned, drift, gain, v, bounds):
     """
     if gain <= 1.0:
         return _arcsin(drift / v) - psi
-    along = _arcsin(drift / v) - _arcsin(turned / gain)  # heading of a car that keeps to the bend
+    along = _arcsin(drift * v_next / v**2) - _arcsin(turned / gain)  # heading of a car that keeps to the bend
     slip = _arcsin((turned - psi + along) / gain)
     if gain < 2.0:
         u = v * np.sin(psi + slip) - drift

@@ -22,7 +22,7 @@ from shield.response import LAT, LON, MEMORY, merge, remember
 
 HALF_WHEELBASE = 2.5  # [m]
 MAX_SLIP = float(np.arctan(np.tan(np.pi / 3) / 2))  # of highway-env's steering [rad]
-BODY = Body(HALF_WHEELBASE, MAX_SLIP, 0.0, True)
+BODY = Body(HALF_WHEELBASE, MAX_SLIP, curvature=0.0, slack=0.0, backs_up=True)
 MAX_SPEED = 40.0  # [m/s]
 CAR_WIDTH, OBSTACLE_SIZE = 2.0, 2.0  # [m]
 

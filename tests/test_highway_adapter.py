@@ -8,7 +8,8 @@ from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Obstacle
 
 from envs import make
-from envs.highway import Settings, ShieldedEgo, road_through
+from envs.highway import Settings, ShieldedEgo
+from envs.roads import road_through
 from shield import PRESETS, Rules
 from shield.geometry import locate
 from shield.response import LAT, LON
