@@ -111,7 +111,7 @@ def test_an_ego_that_may_move_to_neither_side_stays_where_it_is_in_the_lane(shap
     road = road_through(network, ("0", "1", 0))
     x, y, heading = on(network, 12.0, 0.4)
     before, offsets = (np.nan, np.nan), []
-    body = Body(2.5, np.arctan(np.tan(np.pi / 3) / 2), 0.0)
+    body = Body(2.5, np.arctan(np.tan(np.pi / 3) / 2), curvature=0.0, slack=0.0, backs_up=False)
     for _ in range(int(60.0 / (speed * dt))):
         ego = record(road, (x, y, heading), before, speed, dt)
         bend = Bend(*look_ahead(road, x, y, speed, 2.5, dt))

@@ -185,4 +185,4 @@ def test_where_the_frame_of_measurement_jumps_what_was_safe_is_forgotten(radius)
     ego.vehicle.lane_index, ego.vehicle.lane = ("a", "c", 0), lane
     ego.vehicle.target_lane_index = ("a", "c", 0)
     road.act()
-    assert ego.memory[0]["age"] == 1
+    assert ego.memory[0]["age"] == 2  # the sample before, as it is in the new frame, and this one
