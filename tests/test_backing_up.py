@@ -42,7 +42,7 @@ def test_it_is_never_to_blame_for_what_the_reckless_do(others, start_safe, dt):
     episodes = play(3000, w, seed=2)
     counted = collections.Counter(VERDICTS[v] for v in episodes["verdict"][episodes["contact"] >= 0])
     assert set(counted) <= {"other", "inherited"}
-    assert counted["other"] > 100
+    assert counted["other"] > 50
     assert episodes["broken"].sum() == 0
     assert (episodes["backed_up"] > 0).mean() > 0.3
 
