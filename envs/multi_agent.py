@@ -1,5 +1,6 @@
 """MultiAgentShield: several controlled vehicles, each with a shield of its own."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -7,10 +8,12 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
+from envs.arguments import actions_of, plain, rules_of, seed_of
 from envs.highway import Frame, Settings, ShieldedEgo
 from envs.shielding import attach, audit_of, begin_step, end_step, info_of
 from envs.traffic import shield_everybody
 from envs.wrapper import (
+    Params,
     check_action_type,
     check_conduct,
     check_kind,
@@ -20,7 +23,7 @@ from envs.wrapper import (
     traffic_info,
 )
 from shield.blame import Audit
-from shield.params import Preset, RSSParams, Rules
+from shield.params import Rules
 
 
 class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
@@ -47,9 +50,9 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         self,
         env: gym.Env,
         mode: str = "override",
-        params: Preset | tuple[RSSParams, RSSParams] | None = None,
+        params: Params = None,
         intervention_penalty: float = 0.0,
-        rules: Rules = Rules(),
+        rules: Rules | Mapping[str, Any] = Rules(),
         record: bool = False,
         entry: str = "cautious",
         intent: str = "any",
@@ -60,9 +63,9 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         RecordConstructorArgs.__init__(
             self,
             mode=mode,
-            params=params,
-            intervention_penalty=intervention_penalty,
-            rules=rules,
+            params=plain(params),
+            intervention_penalty=plain(intervention_penalty),
+            rules=plain(rules),
             record=record,
             entry=entry,
             intent=intent,
@@ -76,7 +79,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
-        self.rules = rules
+        self.rules = rules_of(rules)
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
@@ -108,13 +111,14 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         return self._drivers
 
     def reset(self, *, seed=None, options=None):
-        observation, info = self.env.reset(seed=seed, options=options)
+        observation, info = self.env.reset(seed=seed_of(seed), options=options)
         check_agents(self.env.unwrapped)
         self._attach()
         info.update(agents=tuple(info_of(ego) for ego in self._egos), **traffic_info(self))
         return observation, info
 
     def step(self, action):
+        action = actions_of(self.action_space, action)
         self._welcome()
         had_contact = [begin_step(ego) for ego in self._egos]
         reward: Any

@@ -3,9 +3,11 @@
 from typing import Any
 
 from highway_env.envs.common.action import DiscreteMetaAction
+from highway_env.envs.common.observation import MultiAgentObservation
 from highway_env.envs.intersection_env import IntersectionEnv
 from pettingzoo import ParallelEnv
 
+from envs.arguments import actions_of
 from envs.multi_agent import MultiAgentShield
 from envs.scenarios import make
 
@@ -42,7 +44,7 @@ class ShieldedParallelEnv(ParallelEnv):
         subtracted from each agent's reward.
 
     Raises:
-      ValueError: no rewards per agent, or an action type without IDLE.
+      ValueError: no rewards or observations per agent, or an action type without IDLE.
     """
 
     def __init__(self, env: MultiAgentShield) -> None:
@@ -51,6 +53,12 @@ class ShieldedParallelEnv(ParallelEnv):
             raise ValueError(
                 f"environment {type(unwrapped).__name__} does not say what each agent earns; "
                 "expected intersection-multi-agent-v0/-v1/-v2"
+            )
+        if not isinstance(unwrapped.observation_type, MultiAgentObservation):
+            kind = type(unwrapped.observation_type).__name__
+            raise ValueError(
+                f"config observation: {kind} is one observation for all; expected type MultiAgentObservation, with "
+                "observation_config = what each agent sees"
             )
         for action_type in unwrapped.action_type.agents_action_types:
             if not isinstance(action_type, DiscreteMetaAction):
@@ -79,12 +87,13 @@ class ShieldedParallelEnv(ParallelEnv):
         """One decision of every agent in `agents`.
 
         Raises:
-          ValueError: an action is missing, or there is one for nobody.
+          ValueError: an action is missing, or there is one for nobody, or one that no agent can do.
         """
         if set(actions) != set(self.agents):
             raise ValueError(f"actions for {sorted(actions)}: expected one for each of {self.agents}")
         everybody = zip(self.possible_agents, self._idle, strict=True)
         joint = tuple(actions.get(agent, idle) for agent, idle in everybody)
+        joint = actions_of(self.env.action_space, joint, [f"action of {agent}" for agent in self.possible_agents])
         observations, _, _, truncated, info = self.env.step(joint)
         penalty = self.env.intervention_penalty
         infos = tuple(

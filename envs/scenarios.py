@@ -1,19 +1,22 @@
 """Named environments and how to make them with a shield."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import gymnasium as gym
 
 import envs.signalised  # noqa: F401  registers another one
 from envs.multi_agent import MultiAgentShield, has_agents
 from envs.stock import make_stock
-from envs.wrapper import ShieldWrapper
-from shield.params import Preset, RSSParams, Rules
+from envs.wrapper import Params, ShieldWrapper
+from shield.params import Rules
 
 
 def make(
     env_id: str,
     shield: str | None = "override",
-    params: Preset | tuple[RSSParams, RSSParams] | None = None,
-    rules: Rules = Rules(),
+    params: Params = None,
+    rules: Rules | Mapping[str, Any] = Rules(),
     intervention_penalty: float = 0.0,
     record: bool = False,
     entry: str = "cautious",

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import gymnasium as gym
 from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.compliant import TurnTaker
@@ -76,6 +77,30 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
         "episode_broken_duties": ego.broken_duties,
         "min_ttc": min(ego.min_ttc, LONGEST_TTC),
     }
+
+
+class Told(gym.Wrapper):
+    """Below a wrapper that reads infos itself: puts into them what a shield around that wrapper says."""
+
+    def __init__(self, env: gym.Env, shield: Any) -> None:
+        super().__init__(env)
+        self.shield = shield
+
+    def step(self, action):
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self.shield.tell(info, reward)
+        return observation, reward, terminated, truncated, info
+
+
+def tell_inside(shield: Any) -> None:
+    """Let a wrapper inside a shield's that reads infos, as stable-baselines3's `Monitor` does, read the shield's."""
+    env, reader = shield.env, None
+    while isinstance(env, gym.Wrapper):
+        if getattr(env, "info_keywords", ()):
+            reader = env
+        env = env.env
+    if reader is not None:
+        reader.env = Told(reader.env, shield)
 
 
 def audit_of(frames: list[Frame], settings: Settings) -> Audit:

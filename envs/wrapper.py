@@ -1,6 +1,6 @@
 """ShieldWrapper: the RSS shield around a highway-env environment."""
 
-import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -14,15 +14,16 @@ from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
 from highway_env.envs.u_turn_env import UTurnEnv
 
+from envs.arguments import action_of, number, plain, preset_of, rules_of, seed_of
 from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
-from envs.shielding import attach, audit_of, begin_step, end_step, info_of
+from envs.shielding import attach, audit_of, begin_step, end_step, info_of, tell_inside
 from envs.signalised import SignalisedIntersectionEnv
 from envs.traffic import TRAFFIC, shield_everybody
 from shield.blame import Audit
 from shield.examined import EXAMINED
 from shield.junction import ENTRIES
 from shield.kinematics import frames_for
-from shield.params import PRESETS, Preset, RSSParams, Rules
+from shield.params import Preset, RSSParams, Rules
 from shield.plans import INTENTS
 
 MODES = ("override", "monitor")
@@ -31,6 +32,7 @@ SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
     "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
 )
+Params = str | Preset | Sequence[RSSParams] | Mapping[str, Any] | None  # see `ShieldWrapper`
 _SCHEMES = {
     **dict.fromkeys((HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv, UTurnEnv), LANES),
     RoundaboutEnv: PLANS,
@@ -71,10 +73,11 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
     Args:
       env: a highway-env environment with one controlled vehicle; see `SUPPORTED`.
       mode: "override" or "monitor".
-      params: `Preset`, a pair of `RSSParams` (ego, other), or None: "intersection" at intersections,
-        "simulator" elsewhere.
+      params: name of a preset, `Preset`, a pair of `RSSParams` (ego, other), a dict of RSS parameters that both have,
+        a dict of two such dicts ("ego", "other"), or None: "intersection" at intersections, "simulator" elsewhere.
+        What a dict leaves out is that of None.
       intervention_penalty: subtracted from the reward, times the step's `override_fraction`.
-      rules: which duties and margins are in force, for ablations.
+      rules: which duties and margins are in force, for ablations: `Rules`, or a dict of those that differ.
       record: keep every frame of the episode in `frames`, for `audit`.
       entry: whom the ego expects to give way at a junction: "cautious" nobody, "priority" who must
         and still can, "assertive" everybody who still can (Def. 17 as printed).
@@ -95,9 +98,9 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         self,
         env: gym.Env,
         mode: str = "override",
-        params: Preset | tuple[RSSParams, RSSParams] | None = None,
+        params: Params = None,
         intervention_penalty: float = 0.0,
-        rules: Rules = Rules(),
+        rules: Rules | Mapping[str, Any] = Rules(),
         record: bool = False,
         entry: str = "cautious",
         intent: str = "any",
@@ -108,9 +111,9 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         RecordConstructorArgs.__init__(
             self,
             mode=mode,
-            params=params,
-            intervention_penalty=intervention_penalty,
-            rules=rules,
+            params=plain(params),
+            intervention_penalty=plain(intervention_penalty),
+            rules=plain(rules),
             record=record,
             entry=entry,
             intent=intent,
@@ -124,10 +127,12 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
-        self.rules = rules
+        self.rules = rules_of(rules)
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
+        self._told = True
+        tell_inside(self)
         self._attach()
 
     @property
@@ -160,7 +165,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         return self._drivers
 
     def reset(self, *, seed=None, options=None):
-        observation, info = self.env.reset(seed=seed, options=options)
+        observation, info = self.env.reset(seed=seed_of(seed), options=options)
         env: Any = self.env.unwrapped
         check_environment(env)
         self._attach()
@@ -168,16 +173,24 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         return observation, info
 
     def step(self, action):
+        executed = action_of(self.action_space, action)
         self._welcome()
-        had_contact = begin_step(self._ego)
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        info.update(end_step(self._ego, had_contact, action), **traffic_info(self))
+        self._action, self._had_contact, self._told = action, begin_step(self._ego), False
+        observation, reward, terminated, truncated, info = self.env.step(executed)
+        self.tell(info, reward)
+        reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
+        return observation, reward, terminated, truncated, info
+
+    def tell(self, info: dict, reward: Any) -> None:
+        """Write into the info of this step what the shield says, once."""
+        if self._told:
+            return
+        self._told = True
+        info.update(end_step(self._ego, self._had_contact, self._action), **traffic_info(self))
         env: Any = self.env.unwrapped
         info.update(time=float(env.time), raw_reward=reward)
         if isinstance(env, IntersectionEnv):
             info["is_success"] = bool(env.has_arrived(env.vehicle))
-        reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
-        return observation, reward, terminated, truncated, info
 
     def _attach(self) -> None:
         env: Any = self.env.unwrapped
@@ -205,8 +218,7 @@ def traffic_info(wrapper) -> dict[str, Any]:
 def check_options(mode: str, intervention_penalty: float, traffic: str) -> None:
     if mode not in MODES:
         raise ValueError(f"mode = {mode!r}: expected one of {', '.join(MODES)}")
-    if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
-        raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
+    number("intervention_penalty", intervention_penalty)
     if traffic not in TRAFFIC:
         raise ValueError(f"traffic = {traffic!r}: expected one of {', '.join(TRAFFIC)}")
 
@@ -285,21 +297,14 @@ def default_preset(env: Any) -> str:
     return "intersection" if isinstance(env, IntersectionEnv) else "simulator"
 
 
-def check_params(params, env: Any) -> Preset:
-    if params is None:
-        return PRESETS[default_preset(env)]
-    if isinstance(params, Preset):
-        return params
-    if isinstance(params, tuple) and len(params) == 2 and all(isinstance(p, RSSParams) for p in params):
-        return Preset(*params, source="given by the user")
-    raise ValueError(f"params = {params!r}: expected a Preset, a pair of RSSParams (ego, other) or None")
+def check_params(params: Any, env: Any, name: str = "params") -> Preset:
+    """The table that somebody asks for in an environment; see `envs.arguments.preset_of`."""
+    return preset_of(params, default_preset(env), name)
 
 
 def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dict[str, Any]) -> Settings:
     """What a shield on `env` runs with: response times rounded up to whole frames (condition C2)."""
     dt = 1 / env.config["simulation_frequency"]
-    RSSParams.validated(**params.ego._asdict())
-    RSSParams.validated(**params.other._asdict())
     rho = params.ego.response_time
     if rho < dt - 1e-9 and not params.per_frame:
         raise ValueError(
