@@ -199,6 +199,7 @@ class ShieldedEgo:
         self.min_ttc = float("inf")
         self.tally = StepTally()
         self.record: list[Frame] | None = [] if record else None
+        self.judge = self  # or another, which watches by a table of its own
         vehicle.act = self.act
 
     # -- called by highway-env
@@ -210,6 +211,13 @@ class ShieldedEgo:
             self.nominal = dict(vehicle.action)
         elif not self.check_contact():
             self._frame()
+            if self.judge is not self:
+                self.judge.watch()
+
+    def watch(self) -> None:
+        """Take in a frame on which another shield has decided."""
+        self.nominal = dict(self.vehicle.action)
+        self._frame()
 
     def _frame(self) -> None:
         vehicle, settings = self.vehicle, self.settings
@@ -345,6 +353,8 @@ class ShieldedEgo:
         vehicle = self.vehicle
         if self.contact is None and (vehicle.crashed or vehicle.impact is not None):
             self.contact = self._judge_contact()
+            if self.judge is not self:
+                self.judge.check_contact()
         return self.contact is not None
 
     def _judge_contact(self) -> dict:

@@ -19,6 +19,7 @@ from envs.wrapper import (
     check_kind,
     check_options,
     check_params,
+    judge_of,
     settings_for,
     traffic_info,
 )
@@ -40,7 +41,8 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
       env: a highway-env environment with `MultiAgentAction`, such as intersection-multi-agent-v0/-v1/-v2.
       intervention_penalty: subtracted from each agent's reward, times its own `override_fraction`; from one
         reward for all, times the mean of these fractions.
-      mode, params, rules, record, entry, intent, waiting, traffic, examine: see `ShieldWrapper`.
+      mode, params, rules, record, entry, intent, waiting, traffic, examine, judge_params, judge_rules: see
+        `ShieldWrapper`.
 
     Raises:
       ValueError: as `ShieldWrapper`.
@@ -59,6 +61,8 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         waiting: str = "line",
         traffic: str = "stock",
         examine: str = "table",
+        judge_params: Params = None,
+        judge_rules: Rules | Mapping[str, Any] | None = None,
     ) -> None:
         RecordConstructorArgs.__init__(
             self,
@@ -72,6 +76,8 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
             waiting=waiting,
             traffic=traffic,
             examine=examine,
+            judge_params=plain(judge_params),
+            judge_rules=plain(judge_rules),
         )
         gym.Wrapper.__init__(self, env)
         check_options(mode, intervention_penalty, traffic)
@@ -80,6 +86,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
         self.rules = rules_of(rules)
+        self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
@@ -98,7 +105,8 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
 
     def audit(self) -> tuple[Audit, ...]:
         """`ShieldWrapper.audit` for each agent. Needs `record=True`."""
-        return tuple(audit_of(frames, self.settings) for frames in self.frames)
+        _ = self.frames  # were they kept?
+        return tuple(audit_of(ego) for ego in self._egos)
 
     @property
     def settings(self) -> Settings:
@@ -137,7 +145,9 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         env: Any = self.env.unwrapped
         self._settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
         goal, among = env.config.get("destination"), self.traffic == "compliant"
-        self._egos = [attach(vehicle, self._settings, self.record, goal, among) for vehicle in env.controlled_vehicles]
+        judge = settings_for(env, *self.judge, "monitor", self.conduct) if self.judge else None
+        common = self._settings, self.record, goal, among, judge
+        self._egos = [attach(vehicle, *common) for vehicle in env.controlled_vehicles]
         self._drivers: list[ShieldedEgo] = []
         self._welcome()
 

@@ -24,6 +24,8 @@ def make(
     waiting: str = "line",
     traffic: str = "stock",
     examine: str = "table",
+    judge_params: Params = None,
+    judge_rules: Rules | Mapping[str, Any] | None = None,
     **kwargs,
 ) -> gym.Env:
     """`gymnasium.make` with a shield around it: `MultiAgentShield` for several agents, `ShieldWrapper` for one.
@@ -31,7 +33,8 @@ def make(
     Args:
       env_id: "highway-fast-v0", "highway-v0", "two-way-v0", "merge-v0", "signalised-intersection-v0", ...
       shield: "override", "monitor", or None for the bare environment.
-      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine: see `ShieldWrapper`.
+      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine, judge_params, judge_rules:
+        see `ShieldWrapper`.
       kwargs: passed to `gymnasium.make`, e.g. `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:
@@ -60,4 +63,6 @@ def make(
         waiting=waiting,
         traffic=traffic,
         examine=examine,
+        judge_params=judge_params,
+        judge_rules=judge_rules,
     )

@@ -32,9 +32,7 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
             if not unknown:
                 raise
             given = ", ".join(f"{name} = {kwargs[name]!r}" for name in unknown)
-            raise ValueError(
-                f"{given}: unknown to {env_id}; expected config, render_mode or max_episode_steps"
-            ) from None
+            raise ValueError(f"{given}: unknown here; expected config, render_mode or max_episode_steps") from None
     limited = env.spec is not None and env.spec.max_episode_steps is not None
     if limited or "duration" in getattr(env.unwrapped, "config", {"duration": None}):
         return env

@@ -53,7 +53,8 @@ def make_vec(
       config: as for `gymnasium.make` of a highway-env environment.
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
-      kwargs: `max_episode_steps`, and whatever else `make` takes where the backend is "highway-env".
+      kwargs: `max_episode_steps`, and whatever else `make` takes (`judge_params`, ...) where the backend is
+        "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.
@@ -75,7 +76,11 @@ def make_vec(
         options |= dict(entry=entry, intent=intent, waiting=waiting, examine=examine) | kwargs
         return _SideBySide([partial(_make_counted, env_id, shield, options)] * num_envs, autoreset_mode=autoreset_mode)
     unsupported = {"traffic": traffic} if traffic != "stock" else {}
-    unsupported |= {name: value for name, value in kwargs.items() if value and name != "max_episode_steps"}
+    unsupported |= {
+        name: value
+        for name, value in kwargs.items()
+        if value is not None and value is not False and name != "max_episode_steps"
+    }
     for name, value in unsupported.items():
         raise Unsupported(f"{name} = {value!r}", "backend = 'highway-env'")
     scenario = compile_scenario(env_id, config, max_episode_steps=kwargs.get("max_episode_steps"))

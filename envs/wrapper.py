@@ -54,8 +54,9 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         always-on limits did), `proposed_action` (after a step), `acceleration_change` [m/s^2] and
         `steering_change` [rad] (largest), `dangerous`, `dangerous_pairs` and `broken_duties`
         (pair-frames), and for the pair nearest to danger `partner` (index in `road.vehicles`,
-        static objects after them, -1 = nobody), `min_margin_lon`, `min_margin_lat` (gap minus
-        required gap [m], inf = nobody); `response`: "none", "longitudinal", "lateral", "both", or "go": on
+        static objects after them, -1 = nobody; where roads cross, who was in the way when the ego was first
+        held back in this step), `min_margin_lon`, `min_margin_lat` (gap minus required gap [m], inf = nobody);
+        `response`: "none", "longitudinal", "lateral", "both", or "go": on
         through a junction.
       cost: 1.0 if the ego broke its proper response in this step or a contact was its fault.
       blame: "" before a contact, then "ego", "other", "both", "inherited", or "none" (a bug).
@@ -88,6 +89,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         everybody, for the same commands; "geofence", "walk", "first-conflicting" and "first" may miss
         somebody (`shield.examined`).
       traffic: "stock", or "compliant": every other car has a shield of its own, in every mode.
+      judge_params, judge_rules: what the ego is judged by, with a memory of its own: blame, duties, cost and dangerous
+        pairs. None = what it is restricted by. A sweep over response times needs one judge for all.
 
     Raises:
       ValueError: unsupported environment, action type or mode; bad parameters; a response time
@@ -107,6 +110,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         waiting: str = "line",
         traffic: str = "stock",
         examine: str = "table",
+        judge_params: Params = None,
+        judge_rules: Rules | Mapping[str, Any] | None = None,
     ) -> None:
         RecordConstructorArgs.__init__(
             self,
@@ -120,6 +125,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
             waiting=waiting,
             traffic=traffic,
             examine=examine,
+            judge_params=plain(judge_params),
+            judge_rules=plain(judge_rules),
         )
         gym.Wrapper.__init__(self, env)
         check_options(mode, intervention_penalty, traffic)
@@ -128,6 +135,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
         self.rules = rules_of(rules)
+        self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
@@ -152,7 +160,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         Raises:
           ValueError: nothing was recorded, or roads cross: infos count the duties there.
         """
-        return audit_of(self.frames, self.settings)
+        _ = self.frames  # were they kept?
+        return audit_of(self._ego)
 
     @property
     def settings(self) -> Settings:
@@ -196,7 +205,8 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         env: Any = self.env.unwrapped
         settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
         goal, among = env.config.get("destination"), self.traffic == "compliant"
-        self._ego = attach(env.vehicle, settings, self.record, goal, among)
+        judge = settings_for(env, *self.judge, "monitor", self.conduct) if self.judge else None
+        self._ego = attach(env.vehicle, settings, self.record, goal, among, judge)
         self._drivers: list[ShieldedEgo] = []
         self._welcome()
 
@@ -300,6 +310,14 @@ def default_preset(env: Any) -> str:
 def check_params(params: Any, env: Any, name: str = "params") -> Preset:
     """The table that somebody asks for in an environment; see `envs.arguments.preset_of`."""
     return preset_of(params, default_preset(env), name)
+
+
+def judge_of(params: Any, rules: Any, own: Preset, own_rules: Rules, env: Any) -> tuple[Preset, Rules] | None:
+    """The table by which an ego is judged, None = the one by which it is restricted."""
+    if params is None and rules is None:
+        return None
+    preset = own if params is None else check_params(params, env, "judge_params")
+    return preset, own_rules if rules is None else rules_of(rules, "judge_rules")
 
 
 def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dict[str, Any]) -> Settings:

@@ -139,7 +139,7 @@ def test_rules_may_be_those_that_differ(rules):
 
 
 def _numbers(env, seed):
-    observation, info = env.reset(seed=seed)
+    observation, _ = env.reset(seed=seed)
     rows = [np.asarray(observation).sum()]
     for _ in range(3):
         action = tuple([1] * len(env.action_space)) if isinstance(env.action_space, gym.spaces.Tuple) else 2
