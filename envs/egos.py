@@ -23,6 +23,7 @@ class EgoShields(gym.Wrapper):
     traffic: str
     risk: RiskSettings | None
     _settings: Settings
+    _judge: Settings | None  # what the egos are judged by, where that is not what they are restricted by
     _egos: list[ShieldedEgo]  # shields of the last step, in the order of the vehicles
 
     def __init__(self, env: gym.Env) -> None:
@@ -54,10 +55,14 @@ class EgoShields(gym.Wrapper):
         """Settings for the environment as it is now."""
         raise NotImplementedError
 
+    def _judge_settings(self) -> Settings | None:
+        """What the egos are judged by, where that is not what they are restricted by."""
+        raise NotImplementedError
+
     def _begin(self) -> None:
         """Put new shields on for a new episode."""
         self._check()
-        self._settings = self._current_settings()
+        self._settings, self._judge = self._current_settings(), self._judge_settings()
         env: Any = self.env.unwrapped
         for shield in list(egos_on(env)):
             _take_off(shield)
@@ -73,7 +78,7 @@ class EgoShields(gym.Wrapper):
         self._check()
         env: Any = self.env.unwrapped
         if self._settings.dt != 1 / env.config["simulation_frequency"]:
-            self._settings = self._current_settings()
+            self._settings, self._judge = self._current_settings(), self._judge_settings()
         self._egos = [self._shield_of(i, vehicle) for i, vehicle in enumerate(env.controlled_vehicles)]
         for shield in list(egos_on(env)):
             if shield not in self._egos:
@@ -91,11 +96,11 @@ class EgoShields(gym.Wrapper):
         shield = shield_on(vehicle)
         if shield is None or not shield.is_ego:
             among = self.traffic == "compliant"
-            shield = attach(vehicle, self._settings, self.record, env.config.get("destination"), among)
+            shield = attach(vehicle, self._settings, self.record, env.config.get("destination"), among, self._judge)
             shield.is_ego = True
             shield.meter = RiskMeter(self.risk) if self.risk is not None else None
             if vehicle.crashed:
-                shield.contact = dict(EARLIER_CONTACT)
+                shield.contact = shield.judge.contact = dict(EARLIER_CONTACT)
             if env.time > 0.0 and i < len(self._egos):
                 shield.go_on_from(self._egos[i])
         elif shield.settings != self._settings:

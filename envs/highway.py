@@ -152,6 +152,7 @@ class ShieldedEgo:
         self.tally = StepTally()
         self.record: list[Frame] | None = [] if record else None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
+        self.judge = self  # or another, which watches by a table of its own
         vehicle.act = self.act
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
@@ -159,6 +160,8 @@ class ShieldedEgo:
         self.frames, self.frames_overridden = former.frames, former.frames_overridden
         self.dangerous_pairs, self.broken_duties = former.dangerous_pairs, former.broken_duties
         self.cost, self.min_ttc = former.cost, former.min_ttc
+        if self.judge is not self:
+            self.judge.go_on_from(former.judge)
 
     # -- called by highway-env
 
@@ -169,8 +172,15 @@ class ShieldedEgo:
             self.nominal = dict(vehicle.action)
         elif not self.check_contact():
             self._frame()
+            if self.judge is not self:
+                self.judge.watch()
             if self.meter is not None:
                 self.meter.look(self)
+
+    def watch(self) -> None:
+        """Take in a frame on which another shield has decided."""
+        self.nominal = dict(self.vehicle.action)
+        self._frame()
 
     def _frame(self) -> None:
         vehicle, settings = self.vehicle, self.settings
@@ -368,6 +378,8 @@ class ShieldedEgo:
         vehicle = self.vehicle
         if self.contact is None and (vehicle.crashed or vehicle.impact is not None):
             self.contact = self._judge_contact()
+            if self.judge is not self:
+                self.judge.check_contact()
         return self.contact is not None
 
     def _judge_contact(self) -> dict | None:

@@ -10,6 +10,7 @@ from envs.signalised import SignalisedRoad
 from shield.blame import Verdict
 from shield.command import Command
 from shield.conflict_areas import CELL
+from shield.held_back import held_by
 from shield.junction import (
     CAUTIOUS,
     CROSSING,
@@ -76,10 +77,14 @@ class JunctionEgo(ShieldedEgo):
         # meta-actions compute a new command on every frame, a continuous one persists
         nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
         acceleration, steering = float(nominal["acceleration"]), float(nominal["steering"])
-        report, steered = self._restrict(self._scene(), acceleration, steering)
+        scene = self._scene()
+        report, steered = self._restrict(scene, acceleration, steering)
         granted = report.acceleration if settings.overrides else acceleration
         if settings.overrides:
             vehicle.action = {"steering": steered, "acceleration": granted}
+        if settings.overrides and report.overridden and self.tally.partner < 0:
+            held = int(held_by(scene, acceleration, len(self.others), not settings.waits_anywhere))
+            self.tally.partner = self._index_on_road(held) if held >= 0 else -1
         if self.refused:
             report = report._replace(overridden=True, limited=False)
             self.refused = False

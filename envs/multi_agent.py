@@ -1,5 +1,6 @@
 """MultiAgentShield: several controlled vehicles, each with a shield of its own."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
@@ -7,22 +8,25 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
+from envs.arguments import actions_of, plain, rules_of, seed_of
 from envs.egos import EgoShields
 from envs.highway import Frame, Settings
 from envs.risk import check_risk
 from envs.shielding import audit_of, begin_step, end_step, info_of
 from envs.stock import check_frequencies
 from envs.wrapper import (
+    Params,
     check_action_type,
     check_conduct,
     check_kind,
     check_options,
     check_params,
+    judge_of,
     settings_for,
     traffic_info,
 )
 from shield.blame import Audit
-from shield.params import Preset, RSSParams, Rules
+from shield.params import Rules
 from shield.risk import RiskSettings
 
 
@@ -40,7 +44,8 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
       env: a highway-env environment with `MultiAgentAction`, such as intersection-multi-agent-v0/-v1/-v2.
       intervention_penalty: subtracted from each agent's reward, times its own `override_fraction`; from one
         reward for all, times the mean of these fractions.
-      mode, params, rules, record, entry, intent, waiting, traffic, examine, risk: see `ShieldWrapper`.
+      mode, params, rules, record, entry, intent, waiting, traffic, examine, risk, judge_params, judge_rules: see
+        `ShieldWrapper`.
 
     Raises:
       ValueError: as `ShieldWrapper`.
@@ -50,9 +55,9 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         self,
         env: gym.Env,
         mode: str = "override",
-        params: Preset | tuple[RSSParams, RSSParams] | None = None,
+        params: Params = None,
         intervention_penalty: float = 0.0,
-        rules: Rules = Rules(),
+        rules: Rules | Mapping[str, Any] = Rules(),
         record: bool = False,
         entry: str = "cautious",
         intent: str = "any",
@@ -60,13 +65,15 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         traffic: str = "stock",
         examine: str = "table",
         risk: bool | RiskSettings = False,
+        judge_params: Params = None,
+        judge_rules: Rules | Mapping[str, Any] | None = None,
     ) -> None:
         RecordConstructorArgs.__init__(
             self,
             mode=mode,
-            params=params,
-            intervention_penalty=intervention_penalty,
-            rules=rules,
+            params=plain(params),
+            intervention_penalty=plain(intervention_penalty),
+            rules=plain(rules),
             record=record,
             entry=entry,
             intent=intent,
@@ -74,6 +81,8 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
             traffic=traffic,
             examine=examine,
             risk=risk,
+            judge_params=plain(judge_params),
+            judge_rules=plain(judge_rules),
         )
         check_options(mode, intervention_penalty, traffic)
         check_agents(env.unwrapped)
@@ -81,7 +90,8 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
-        self.rules = rules
+        self.rules = rules_of(rules)
+        self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
@@ -101,17 +111,19 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
 
     def audit(self) -> tuple[Audit, ...]:
         """`ShieldWrapper.audit` for each agent. Needs `record=True`."""
-        return tuple(audit_of(frames, self.settings) for frames in self.frames)
+        _ = self.frames  # were they kept?
+        return tuple(audit_of(ego) for ego in self._egos)
 
     def reset(self, *, seed=None, options=None):
         env: Any = self.env.unwrapped
         check_frequencies(env.config | ((options or {}).get("config") or {}))
-        observation, info = self.env.reset(seed=seed, options=options)
+        observation, info = self.env.reset(seed=seed_of(seed), options=options)
         self._begin()
         info.update(agents=tuple(info_of(ego) for ego in self._egos), **traffic_info(self))
         return observation, info
 
     def step(self, action):
+        action = actions_of(self.action_space, action)
         egos = self._guard()
         had_contact = [begin_step(ego) for ego in egos]
         reward: Any
@@ -132,6 +144,9 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
 
     def _current_settings(self) -> Settings:
         return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
+
+    def _judge_settings(self) -> Settings | None:
+        return settings_for(self.env.unwrapped, *self.judge, "monitor", self.conduct) if self.judge else None
 
 
 def outcome_of_agents(env: Any, actions: tuple) -> tuple[list[float], list[bool]]:

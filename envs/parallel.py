@@ -3,8 +3,10 @@
 from typing import Any
 
 from highway_env.envs.common.action import DiscreteMetaAction
+from highway_env.envs.common.observation import MultiAgentObservation
 from pettingzoo import ParallelEnv
 
+from envs.arguments import actions_of
 from envs.multi_agent import MultiAgentShield, outcome_of_agents
 from envs.scenarios import make
 
@@ -42,11 +44,17 @@ class ShieldedParallelEnv(ParallelEnv):
       env: `MultiAgentShield`; its penalty is subtracted from each agent's reward.
 
     Raises:
-      ValueError: an action type without IDLE.
+      ValueError: no observations per agent, or an action type without IDLE.
     """
 
     def __init__(self, env: MultiAgentShield) -> None:
         unwrapped: Any = env.unwrapped
+        if not isinstance(unwrapped.observation_type, MultiAgentObservation):
+            kind = type(unwrapped.observation_type).__name__
+            raise ValueError(
+                f"config observation: {kind} is one observation for all; expected type MultiAgentObservation, with "
+                "observation_config = what each agent sees"
+            )
         for action_type in unwrapped.action_type.agents_action_types:
             if not isinstance(action_type, DiscreteMetaAction):
                 raise ValueError(f"action type {type(action_type).__name__} has no IDLE; expected DiscreteMetaAction")
@@ -74,12 +82,13 @@ class ShieldedParallelEnv(ParallelEnv):
         """One decision of every agent in `agents`.
 
         Raises:
-          ValueError: an action is missing, or there is one for nobody.
+          ValueError: an action is missing, or there is one for nobody, or one that no agent can do.
         """
         if set(actions) != set(self.agents):
             raise ValueError(f"actions for {sorted(actions)}: expected one for each of {self.agents}")
         everybody = zip(self.possible_agents, self._idle, strict=True)
         joint = tuple(actions.get(agent, idle) for agent, idle in everybody)
+        joint = actions_of(self.env.action_space, joint, [f"action of {agent}" for agent in self.possible_agents])
         observations, _, _, truncated, info = self.env.step(joint)
         earned, ended = info.get("agents_rewards"), info.get("agents_terminated")
         if earned is None:  # an intersection says it, and its traffic has moved on since

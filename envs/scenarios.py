@@ -1,20 +1,23 @@
 """Named environments and how to make them with a shield."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import gymnasium as gym
 
 import envs.signalised  # noqa: F401  registers another one
 from envs.multi_agent import MultiAgentShield, has_agents
 from envs.stock import make_stock
-from envs.wrapper import ShieldWrapper
-from shield.params import Preset, RSSParams, Rules
+from envs.wrapper import Params, ShieldWrapper
+from shield.params import Rules
 from shield.risk import RiskSettings
 
 
 def make(
     env_id: str,
     shield: str | None = "override",
-    params: Preset | tuple[RSSParams, RSSParams] | None = None,
-    rules: Rules = Rules(),
+    params: Params = None,
+    rules: Rules | Mapping[str, Any] = Rules(),
     intervention_penalty: float = 0.0,
     record: bool = False,
     entry: str = "cautious",
@@ -23,6 +26,8 @@ def make(
     traffic: str = "stock",
     examine: str = "table",
     risk: bool | RiskSettings = False,
+    judge_params: Params = None,
+    judge_rules: Rules | Mapping[str, Any] | None = None,
     **kwargs,
 ) -> gym.Env:
     """`gymnasium.make` with a shield around it: `MultiAgentShield` for several agents, `ShieldWrapper` for one.
@@ -30,7 +35,8 @@ def make(
     Args:
       env_id: "highway-fast-v0", "highway-v0", "two-way-v0", "merge-v0", "signalised-intersection-v0", ...
       shield: "override", "monitor", or None for the bare environment.
-      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine, risk: see `ShieldWrapper`.
+      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine, risk, judge_params,
+        judge_rules: see `ShieldWrapper`.
       kwargs: passed to `gymnasium.make`, e.g. `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:
@@ -62,4 +68,6 @@ def make(
         traffic=traffic,
         examine=examine,
         risk=risk,
+        judge_params=judge_params,
+        judge_rules=judge_rules,
     )

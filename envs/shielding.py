@@ -2,11 +2,12 @@
 
 from typing import Any
 
+import gymnasium as gym
 from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.compliant import TurnTaker
 from envs.free_steering import FreeEgo
-from envs.highway import LANES, Frame, Settings, ShieldedEgo, StepTally, log_of, response_name
+from envs.highway import LANES, Settings, ShieldedEgo, StepTally, log_of, response_name
 from envs.junction_ego import JunctionEgo
 from shield.blame import Audit, audit
 
@@ -14,7 +15,12 @@ LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
 
 
 def attach(
-    vehicle: Any, settings: Settings, record: bool = False, destination: str = "", takes_turns: bool = False
+    vehicle: Any,
+    settings: Settings,
+    record: bool = False,
+    destination: str = "",
+    takes_turns: bool = False,
+    judge: Settings | None = None,
 ) -> ShieldedEgo:
     """Put a shield on a vehicle.
 
@@ -23,7 +29,13 @@ def attach(
       settings, record: see `ShieldedEgo`.
       destination: where a car goes that is steered freely and has no route; needed where roads cross.
       takes_turns: it is among compliant drivers.
+      judge: what it is judged by, where that is not what it is restricted by.
     """
+    if judge is not None:  # first, because the shield that acts is the one that was attached last
+        watching = attach(vehicle, judge._replace(overrides=False), record, destination)
+        ego = attach(vehicle, settings, record, destination, takes_turns)
+        ego.judge = watching
+        return ego
     if settings.scheme == LANES:
         return ShieldedEgo(vehicle, settings, record)
     if not isinstance(vehicle, ControlledVehicle):
@@ -42,14 +54,17 @@ def begin_step(ego: ShieldedEgo) -> bool:
     ego.tally = StepTally()
     if ego.meter is not None:
         ego.meter.begin_step()
+    if ego.judge is not ego:
+        ego.judge.tally = StepTally()
     return ego.contact is not None
 
 
 def end_step(ego: ShieldedEgo, had_contact: bool, action: Any) -> dict[str, Any]:
     """Judge what happened since `begin_step`; returns the info of this step."""
     ego.check_contact()
-    at_fault = not had_contact and ego.contact is not None and ego.contact["verdict"] in ("ego", "both")
-    cost = 1.0 if ego.tally.broken_duties or at_fault else 0.0
+    judge = ego.judge
+    at_fault = not had_contact and judge.contact is not None and judge.contact["verdict"] in ("ego", "both")
+    cost = 1.0 if judge.tally.broken_duties or at_fault else 0.0
     ego.cost += cost
     info = info_of(ego, cost)
     info["shield"]["proposed_action"] = action
@@ -58,7 +73,7 @@ def end_step(ego: ShieldedEgo, had_contact: bool, action: Any) -> dict[str, Any]
 
 def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
     """What a wrapper says about one ego after a step; see `ShieldWrapper` for the keys."""
-    tally = ego.tally
+    tally, judge = ego.tally, ego.judge
     frames = max(tally.frames, 1)
     return {
         "shield": {
@@ -67,32 +82,57 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
             "limited_fraction": tally.limited / frames,
             "acceleration_change": tally.acceleration_change,
             "steering_change": tally.steering_change,
-            "dangerous": tally.dangerous_pairs > 0,
-            "dangerous_pairs": tally.dangerous_pairs,
-            "broken_duties": tally.broken_duties,
+            "dangerous": judge.tally.dangerous_pairs > 0,
+            "dangerous_pairs": judge.tally.dangerous_pairs,
+            "broken_duties": judge.tally.broken_duties,
             "min_margin_lon": tally.margin_lon,
             "min_margin_lat": tally.margin_lat,
             "partner": tally.partner,
             "response": response_name(tally.response),
         },
         "cost": cost,
-        "blame": ego.contact["verdict"] if ego.contact else "",
-        "blame_evidence": dict(ego.contact) if ego.contact else {},
+        "blame": judge.contact["verdict"] if judge.contact else "",
+        "blame_evidence": dict(judge.contact) if judge.contact else {},
         "override_share": ego.frames_overridden / max(ego.frames, 1),
         "episode_cost": ego.cost,
-        "episode_dangerous_pairs": ego.dangerous_pairs,
-        "episode_broken_duties": ego.broken_duties,
+        "episode_dangerous_pairs": judge.dangerous_pairs,
+        "episode_broken_duties": judge.broken_duties,
         "min_ttc": min(ego.min_ttc, LONGEST_TTC),
         **(ego.meter.info() if ego.meter is not None else {}),
     }
 
 
-def audit_of(frames: list[Frame], settings: Settings) -> Audit:
-    """For every dangerous pair-frame of one ego: did it keep its duty?
+class Told(gym.Wrapper):
+    """Below a wrapper that reads infos itself: puts into them what a shield around that wrapper says."""
+
+    def __init__(self, env: gym.Env, shield: Any) -> None:
+        super().__init__(env)
+        self.shield = shield
+
+    def step(self, action):
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self.shield.tell(info, reward)
+        return observation, reward, terminated, truncated, info
+
+
+def tell_inside(shield: Any) -> None:
+    """Let a wrapper inside a shield's that reads infos, as stable-baselines3's `Monitor` does, read the shield's."""
+    env, reader = shield.env, None
+    while isinstance(env, gym.Wrapper):
+        if getattr(env, "info_keywords", ()):
+            reader = env
+        env = env.env
+    if reader is not None:
+        reader.env = Told(reader.env, shield)
+
+
+def audit_of(ego: ShieldedEgo) -> Audit:
+    """For every recorded dangerous pair-frame of one ego: did it keep its duty?
 
     Raises:
       ValueError: roads cross; recorded frames hold distances along a lane, and the duties there are others.
     """
+    settings, frames = ego.judge.settings, ego.judge.record or []
     if settings.scheme != LANES:
         raise ValueError(
             "audit: expected an environment without junctions; where roads cross, infos count the pair-frames: "

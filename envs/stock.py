@@ -14,6 +14,8 @@ from highway_env.utils import class_from_path
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
+from envs.arguments import whole
+
 LONGEST_EPISODE = 100  # decisions, where highway-env sets no limit
 # what `IntersectionEnv` writes into the class of its traffic, and what `IDMVehicle` is defined with
 AT_INTERSECTIONS = {"DISTANCE_WANTED": 7.0, "COMFORT_ACC_MAX": 6.0, "COMFORT_ACC_MIN": -3.0}
@@ -27,14 +29,15 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
     That there is a later version of an environment asked for by its version is not said, once for each of a batch.
 
     Raises:
-      ValueError: more decisions than frames.
+      ValueError: an argument that the environment does not have, a bad `max_episode_steps`, or more decisions than
+        frames.
     """
+    if kwargs.get("max_episode_steps") is not None:
+        kwargs["max_episode_steps"] = whole("max_episode_steps", kwargs["max_episode_steps"], 1)
     with suppress(Exception):  # `gymnasium.make` complains; a class that exists before is left as it is
         class_from_path(kwargs["config"]["other_vehicles_type"])
     with drivers_unchanged():
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", ".*is out of date", DeprecationWarning)
-            env = gym.make(env_id, **kwargs)
+        env = _made(env_id, kwargs)
         unwrapped: Any = env.unwrapped
         if not isinstance(unwrapped, AbstractEnv):
             return env
@@ -42,6 +45,19 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
         Upkeep(unwrapped)
     limited = env.spec is not None and env.spec.max_episode_steps is not None
     return env if limited or _has_duration(unwrapped) else TimeLimit(env, LONGEST_EPISODE)
+
+
+def _made(env_id: str, arguments: dict[str, Any]) -> gym.Env:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*is out of date", DeprecationWarning)
+        try:
+            return gym.make(env_id, **arguments)
+        except TypeError as error:
+            unknown = [name for name in arguments if f"unexpected keyword argument '{name}'" in str(error)]
+            if not unknown:
+                raise
+            given = ", ".join(f"{name} = {arguments[name]!r}" for name in unknown)
+            raise ValueError(f"{given}: unknown here; expected config, render_mode or max_episode_steps") from None
 
 
 def check_frequencies(config: dict) -> None:

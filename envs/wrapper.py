@@ -1,6 +1,6 @@
 """ShieldWrapper: the RSS shield around a highway-env environment."""
 
-import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -14,10 +14,11 @@ from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
 from highway_env.envs.u_turn_env import UTurnEnv
 
+from envs.arguments import action_of, number, plain, preset_of, rules_of, seed_of
 from envs.egos import EgoShields
 from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
 from envs.risk import RiskFrame, check_risk
-from envs.shielding import audit_of, begin_step, end_step, info_of
+from envs.shielding import audit_of, begin_step, end_step, info_of, tell_inside
 from envs.signalised import SignalisedIntersectionEnv
 from envs.stock import check_frequencies
 from envs.traffic import TRAFFIC
@@ -25,7 +26,7 @@ from shield.blame import Audit
 from shield.examined import EXAMINED
 from shield.junction import ENTRIES
 from shield.kinematics import frames_for
-from shield.params import PRESETS, Preset, RSSParams, Rules
+from shield.params import Preset, RSSParams, Rules
 from shield.plans import INTENTS
 from shield.risk import RiskSettings
 
@@ -35,6 +36,7 @@ SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
     "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
 )
+Params = str | Preset | Sequence[RSSParams] | Mapping[str, Any] | None  # see `ShieldWrapper`
 _SCHEMES = {
     **dict.fromkeys((HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv, UTurnEnv), LANES),
     RoundaboutEnv: PLANS,
@@ -56,8 +58,9 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         always-on limits did), `proposed_action` (after a step), `acceleration_change` [m/s^2] and
         `steering_change` [rad] (largest), `dangerous`, `dangerous_pairs` and `broken_duties`
         (pair-frames), and for the pair nearest to danger `partner` (index in `road.vehicles`,
-        static objects after them, -1 = nobody), `min_margin_lon`, `min_margin_lat` (gap minus
-        required gap [m], inf = nobody); `response`: "none", "longitudinal", "lateral", "both", or "go": on
+        static objects after them, -1 = nobody; where roads cross, who was in the way when the ego was first
+        held back in this step), `min_margin_lon`, `min_margin_lat` (gap minus required gap [m], inf = nobody);
+        `response`: "none", "longitudinal", "lateral", "both", or "go": on
         through a junction.
       cost: 1.0 if the ego broke its proper response in this step or a contact was its fault.
       blame: "" before a contact, then "ego", "other", "both", "inherited", or "none" (a bug).
@@ -81,10 +84,11 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
     Args:
       env: a highway-env environment with one controlled vehicle; see `SUPPORTED`.
       mode: "override" or "monitor".
-      params: `Preset`, a pair of `RSSParams` (ego, other), or None: "intersection" at intersections,
-        "simulator" elsewhere.
+      params: name of a preset, `Preset`, a pair of `RSSParams` (ego, other), a dict of RSS parameters that both have,
+        a dict of two such dicts ("ego", "other"), or None: "intersection" at intersections, "simulator" elsewhere.
+        What a dict leaves out is that of None.
       intervention_penalty: subtracted from the reward, times the step's `override_fraction`.
-      rules: which duties and margins are in force, for ablations.
+      rules: which duties and margins are in force, for ablations: `Rules`, or a dict of those that differ.
       record: keep every frame of the episode in `frames`, for `audit`.
       entry: whom the ego expects to give way at a junction: "cautious" nobody, "priority" who must
         and still can, "assertive" everybody who still can (Def. 17 as printed).
@@ -96,6 +100,8 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         somebody (`shield.examined`).
       traffic: "stock", or "compliant": every other car has a shield of its own, in every mode.
       risk: measure the driving safety field around the ego, too: True, or `RiskSettings`.
+      judge_params, judge_rules: what the ego is judged by, with a memory of its own: blame, duties, cost and dangerous
+        pairs. None = what it is restricted by. A sweep over response times needs one judge for all.
 
     Raises:
       ValueError: unsupported environment, action type or mode; bad parameters; a response time
@@ -106,9 +112,9 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         self,
         env: gym.Env,
         mode: str = "override",
-        params: Preset | tuple[RSSParams, RSSParams] | None = None,
+        params: Params = None,
         intervention_penalty: float = 0.0,
-        rules: Rules = Rules(),
+        rules: Rules | Mapping[str, Any] = Rules(),
         record: bool = False,
         entry: str = "cautious",
         intent: str = "any",
@@ -116,13 +122,15 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         traffic: str = "stock",
         examine: str = "table",
         risk: bool | RiskSettings = False,
+        judge_params: Params = None,
+        judge_rules: Rules | Mapping[str, Any] | None = None,
     ) -> None:
         RecordConstructorArgs.__init__(
             self,
             mode=mode,
-            params=params,
-            intervention_penalty=intervention_penalty,
-            rules=rules,
+            params=plain(params),
+            intervention_penalty=plain(intervention_penalty),
+            rules=plain(rules),
             record=record,
             entry=entry,
             intent=intent,
@@ -130,6 +138,8 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
             traffic=traffic,
             examine=examine,
             risk=risk,
+            judge_params=plain(judge_params),
+            judge_rules=plain(judge_rules),
         )
         check_options(mode, intervention_penalty, traffic)
         check_environment(env.unwrapped)
@@ -137,11 +147,14 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
-        self.rules = rules
+        self.rules = rules_of(rules)
+        self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
         self.risk = check_risk(risk)
+        self._told = True
+        tell_inside(self)
         self._begin()
 
     @property
@@ -172,29 +185,38 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         Raises:
           ValueError: nothing was recorded, or roads cross: infos count the duties there.
         """
-        return audit_of(self.frames, self.settings)
+        _ = self.frames  # were they kept?
+        return audit_of(self._ego)
 
     def reset(self, *, seed=None, options=None):
         env: Any = self.env.unwrapped
         check_frequencies(env.config | ((options or {}).get("config") or {}))
-        observation, info = self.env.reset(seed=seed, options=options)
+        observation, info = self.env.reset(seed=seed_of(seed), options=options)
         self._begin()
         env = self.env.unwrapped
         info.update(info_of(self._egos[0]), time=float(env.time), **traffic_info(self))
         return observation, info
 
     def step(self, action):
-        egos = self._guard()
-        had_contact = begin_step(egos[0])
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        (ego,) = self._guard_after_step(egos)
-        info.update(end_step(ego, had_contact, action), **traffic_info(self))
+        executed = action_of(self.action_space, action)
+        self._stepping = self._guard()
+        self._action, self._had_contact, self._told = action, begin_step(self._stepping[0]), False
+        observation, reward, terminated, truncated, info = self.env.step(executed)
+        self.tell(info, reward)
+        reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
+        return observation, reward, terminated, truncated, info
+
+    def tell(self, info: dict, reward: Any) -> None:
+        """Write into the info of this step what the shield says, once."""
+        if self._told:
+            return
+        self._told = True
+        (ego,) = self._guard_after_step(self._stepping)
+        info.update(end_step(ego, self._had_contact, self._action), **traffic_info(self))
         env: Any = self.env.unwrapped
         info.update(time=float(env.time), raw_reward=reward)
         if isinstance(env, IntersectionEnv):
             info["is_success"] = bool(env.has_arrived(env.vehicle))
-        reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
-        return observation, reward, terminated, truncated, info
 
     @property
     def _ego(self) -> ShieldedEgo:
@@ -206,6 +228,9 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
 
     def _current_settings(self) -> Settings:
         return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
+
+    def _judge_settings(self) -> Settings | None:
+        return settings_for(self.env.unwrapped, *self.judge, "monitor", self.conduct) if self.judge else None
 
 
 def traffic_info(wrapper) -> dict[str, Any]:
@@ -219,8 +244,7 @@ def traffic_info(wrapper) -> dict[str, Any]:
 def check_options(mode: str, intervention_penalty: float, traffic: str) -> None:
     if mode not in MODES:
         raise ValueError(f"mode = {mode!r}: expected one of {', '.join(MODES)}")
-    if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
-        raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
+    number("intervention_penalty", intervention_penalty)
     if traffic not in TRAFFIC:
         raise ValueError(f"traffic = {traffic!r}: expected one of {', '.join(TRAFFIC)}")
 
@@ -300,21 +324,22 @@ def default_preset(env: Any) -> str:
     return "intersection" if isinstance(env, IntersectionEnv) else "simulator"
 
 
-def check_params(params, env: Any) -> Preset:
-    if params is None:
-        return PRESETS[default_preset(env)]
-    if isinstance(params, Preset):
-        return params
-    if isinstance(params, tuple) and len(params) == 2 and all(isinstance(p, RSSParams) for p in params):
-        return Preset(*params, source="given by the user")
-    raise ValueError(f"params = {params!r}: expected a Preset, a pair of RSSParams (ego, other) or None")
+def check_params(params: Any, env: Any, name: str = "params") -> Preset:
+    """The table that somebody asks for in an environment; see `envs.arguments.preset_of`."""
+    return preset_of(params, default_preset(env), name)
+
+
+def judge_of(params: Any, rules: Any, own: Preset, own_rules: Rules, env: Any) -> tuple[Preset, Rules] | None:
+    """The table by which an ego is judged, None = the one by which it is restricted."""
+    if params is None and rules is None:
+        return None
+    preset = own if params is None else check_params(params, env, "judge_params")
+    return preset, own_rules if rules is None else rules_of(rules, "judge_rules")
 
 
 def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dict[str, Any]) -> Settings:
     """What a shield on `env` runs with: response times rounded up to whole frames (condition C2)."""
     dt = 1 / env.config["simulation_frequency"]
-    RSSParams.validated(**params.ego._asdict())
-    RSSParams.validated(**params.other._asdict())
     rho = params.ego.response_time
     if rho < dt - 1e-9 and not params.per_frame:
         raise ValueError(

@@ -1,6 +1,8 @@
 """How the functions of this package are compiled, and when again."""
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -11,11 +13,19 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from shield.indices import take_as_they_are
-from shield.parts import APART, MERGED, PLAIN, UNWRAPPED, also_outside, only_inside
-
 _njit: Any = numba.njit  # its published types lack some options
-take_as_they_are()
+_parts: Any
+try:
+    from shield import parts as _parts
+except ImportError as error:
+    _parts = None
+    warnings.warn(f"{error}: functions are compiled in numba's own way, slower and for the same results", stacklevel=2)
+
+# Options of numba. What allocates nothing needs no reference counts, which would cost more than the work itself.
+PLAIN: dict[str, Any] = {"_nrt": False, "error_model": "numpy"}
+# said of every function: numba would else give it what its first compiled caller has
+MERGED: dict[str, Any] = {"forceinline": True}
+APART: dict[str, Any] = {"forceinline": False}
 
 
 def fingerprint(*more: Path) -> str:
@@ -28,7 +38,7 @@ def fingerprint(*more: Path) -> str:
 
 def inner(function: Callable[..., Any]) -> Any:
     """`compiled` for what is called from compiled functions only."""
-    return only_inside(_njit(**PLAIN, **UNWRAPPED, **MERGED)(function))
+    return only_inside(function, **PLAIN, **MERGED)
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -41,7 +51,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     elsewhere it would go on with the old code. A shield must never do that, so any change in the
     package, or in that of the function, compiles everything anew.
     """
-    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **PLAIN, **MERGED)(function))
+    return also_outside(function, _stamp_of(function), **PLAIN, **MERGED)
 
 
 def apart(function: Callable[..., Any]) -> Any:
@@ -49,7 +59,7 @@ def apart(function: Callable[..., Any]) -> Any:
 
     For what is large and rarely called: one huge function takes far longer to translate than several.
     """
-    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, **PLAIN, **APART)(function))
+    return also_outside(function, _stamp_of(function), **PLAIN, **APART)
 
 
 def rare(function: Callable[..., Any]) -> Any:
@@ -57,18 +67,38 @@ def rare(function: Callable[..., Any]) -> Any:
 
     It does not even lie between what is often executed, so that more of that fits into the processor's cache.
     """
-    dispatcher = only_inside(_njit(**PLAIN, **UNWRAPPED, **APART)(function))
-    dispatcher.rare = True
-    return dispatcher
+    return only_inside(function, rare=True, **PLAIN, **APART)
 
 
 def compiled_for_arrays(function: Callable[..., Any]) -> Any:
     """`compiled` for what also takes whole arrays, or makes them."""
-    return _stamped(_njit(cache=True, no_cfunc_wrapper=True, error_model="numpy", **MERGED)(function))
+    return also_outside(function, _stamp_of(function), error_model="numpy", **MERGED)
 
 
-def _stamped(dispatcher: Any) -> Any:
-    return also_outside(cached_for(dispatcher, _stamp(Path(dispatcher.py_func.__code__.co_filename).parent)))
+def only_inside(function: Callable[..., Any], rare: bool = False, **options: Any) -> Any:
+    """Compile what is called from compiled functions only: it becomes a part of them."""
+    return _njit(**options)(function) if _parts is None else _parts.only_inside(function, rare, **options)
+
+
+def also_outside(function: Callable[..., Any], sources: str = "", **options: Any) -> Any:
+    """Compile what Python calls, and compiled functions perhaps.
+
+    Args:
+      function: Python's.
+      sources: a text that stands for all that it is made of, to keep it on disk for later runs; "" = it is not kept.
+      options: of numba.
+    """
+    make = _njit if _parts is None else _parts.also_outside
+    if not sources:
+        return make(function, **options)
+    return cached_for(make(function, cache=True, **options), sources)
+
+
+@contextmanager
+def compiling_quickly() -> Iterator[None]:
+    """Compile at LLVM's first level of optimisation: large functions are ready sooner and run as fast."""
+    with _parts.quickly() if _parts else nullcontext():
+        yield
 
 
 def cached_for(dispatcher: Any, sources: str) -> Any:
@@ -78,6 +108,10 @@ def cached_for(dispatcher: Any, sources: str) -> Any:
     # compared before anything else is read, which may name types that are no more
     index._version = f"{numba.__version__} {sources}"
     return dispatcher
+
+
+def _stamp_of(function: Callable[..., Any]) -> str:
+    return _stamp(Path(function.__code__.co_filename).parent)
 
 
 @cache

@@ -1,26 +1,41 @@
 """Indices of compiled functions are taken as they are.
 
 numba, like Python, counts a negative index from the end, and asks on every access whether it is one: an eighth of the
-engine's time. No compiled function of this project has negative indices. Run with `NUMBA_BOUNDSCHECK=1` (and a
+engine's time. It does not ask where an index has no sign, and so it is told here of every index into an array. No
+compiled function of this project has negative indices. Run with `NUMBA_BOUNDSCHECK=1` (and a
 `NUMBA_CACHE_DIR` of its own, as numba's cache does not tell the two apart) one is an IndexError; a test does so.
 """
 
 from typing import Any
 
-from numba.core import types
-from numba.np import arrayobj
+from numba import types
+from numba.core.lowering import Lower
 
-_arrays: Any = arrayobj
-_OURS = "_ZN6shield", "_ZN4envs"  # symbols of functions of these packages
-_counted_from_the_end = _arrays.fix_integer_index
-
-
-def _as_it_is(context: Any, builder: Any, kind: Any, index: Any, size: Any) -> Any:
-    if not builder.function.name.startswith(_OURS):
-        return _counted_from_the_end(context, builder, kind, index, size)
-    return context.cast(builder, index, kind, types.intp if kind.signed else types.uintp)
+_types: Any = types
+_Lower: Any = Lower
 
 
-def take_as_they_are() -> None:
-    """From now on; whatever numba compiles of other packages remains as it was."""
-    _arrays.fix_integer_index = _as_it_is
+class AsTheyAre(_Lower):
+    """numba's step from a function with types to LLVM. Nobody's functions take it but those compiled with it."""
+
+    def lower_getitem(self, *what: Any) -> Any:
+        *before, signature = what
+        return super().lower_getitem(*before, _without_sign(signature))
+
+    def lower_setitem(self, *what: Any) -> Any:
+        *before, signature = what
+        return super().lower_setitem(*before, _without_sign(signature))
+
+
+def _without_sign(signature: Any) -> Any:
+    """Signature of an access: what is accessed, the index, and perhaps a value."""
+    array, index, *value = signature.args
+    return signature.replace(args=(array, _index(index), *value)) if isinstance(array, _types.Buffer) else signature
+
+
+def _index(kind: Any) -> Any:
+    if isinstance(kind, _types.Integer) and kind.signed:
+        return _types.uintp
+    if isinstance(kind, _types.Tuple | _types.UniTuple):
+        return _types.BaseTuple.from_types([_index(one) for one in kind.types])
+    return kind

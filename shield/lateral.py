@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from shield.anything import compiled_for_anything
 from shield.compiled import choose, compiled_for_arrays
 
 
-@compiled_for_arrays
+@compiled_for_anything
 def d_min_lateral(u_left, u_right, left, right, mode="no_credit"):
     """Smallest safe lateral gap between two cars side by side (Def. 6, Lemma 4) [m].
 
@@ -21,7 +22,7 @@ def d_min_lateral(u_left, u_right, left, right, mode="no_credit"):
       paper      Lemma 4 as printed: a car that races away needs more room, not less.
 
     Args:
-      u_left, u_right: lateral speeds, positive to the right [m/s], floats or arrays that broadcast.
+      u_left, u_right: lateral speeds, positive to the right [m/s], floats, lists or arrays that broadcast.
       left, right: `RSSParams` of the car on the left and on the right.
       mode: one of the four readings.
 
@@ -132,7 +133,7 @@ def lateral_euler_margin(w, car, dt):
     return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8 + frame_start
 
 
-@compiled_for_arrays
+@compiled_for_anything
 def mu_lateral_velocity(time, path, k, mu):
     """mu-lateral velocity at sample `k` of a recorded lateral path (Def. 5) [m/s]. Offline: it looks ahead.
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from shield.anything import compiled_for_anything, compiled_for_numbers
 from shield.compiled import choose, compiled, compiled_for_arrays
 from shield.kinematics import forward_reach, reach, response_distance, speed_after_response, stopping_distance
 
 
-@compiled_for_arrays
+@compiled_for_anything
 def d_min_same_direction(v_rear, v_front, rear, front, mode="exact"):
     """Smallest safe gap to a car ahead driving the same way (Def. 1, Lemma 2) [m].
 
@@ -18,7 +19,7 @@ def d_min_same_direction(v_rear, v_front, rear, front, mode="exact"):
     arXiv:1911.01207).
 
     Args:
-      v_rear, v_front: speeds >= 0 [m/s], floats or arrays that broadcast.
+      v_rear, v_front: speeds >= 0 [m/s], floats, lists or arrays that broadcast.
       rear, front: `RSSParams` of each driver.
       mode: "exact" (default) or "lemma2", the printed closed form.
 
@@ -66,7 +67,7 @@ def _closest_while_braking(v_rear, v_front, rear, front):
     return choose(both_roll, needed, -np.inf)
 
 
-@compiled_for_arrays
+@compiled_for_anything
 def d_min_opposite_direction(v_correct, v_wrong, correct, wrong):
     """Smallest safe gap between two cars driving toward each other (Def. 2, Lemma 3) [m].
 
@@ -74,7 +75,7 @@ def d_min_opposite_direction(v_correct, v_wrong, correct, wrong):
     `a_min_brake_correct` and the wrong-way car at `a_min_brake`.
 
     Args:
-      v_correct, v_wrong: speeds as magnitudes >= 0 [m/s], floats or arrays that broadcast.
+      v_correct, v_wrong: speeds as magnitudes >= 0 [m/s], floats, lists or arrays that broadcast.
       correct, wrong: `RSSParams` of the car in its own lane and of the other one.
 
     Returns:
@@ -85,7 +86,7 @@ def d_min_opposite_direction(v_correct, v_wrong, correct, wrong):
     return d_correct + d_wrong + np.maximum(correct.standstill_gap, wrong.standstill_gap)
 
 
-@compiled_for_arrays
+@compiled_for_numbers
 def d_min_longitudinal(v_rear, v_front, facing, rear, front, b_rear, b_front):
     """Smallest safe gap for any signs of speed (floats only) [m].
 

@@ -1,5 +1,8 @@
 """How functions are compiled."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +16,7 @@ import shield
 from envs.fast.compiled import sources
 from envs.fast.engine import run
 from envs.fast.floats import norm
-from shield.compiled import cached_for, compiled, inner, larger, smaller
+from shield.compiled import cached_for, compiled, compiling_quickly, inner, larger, smaller
 from shield.plans import step
 
 
@@ -107,3 +110,45 @@ def test_the_smaller_and_the_larger_are_those_of_numpy():
         expected = np.minimum(values, a), np.maximum(values, a)
         np.testing.assert_array_equal(compiled(np.array(values), a), expected)
         assert np.isnan(compiled(a, np.nan)).all()
+
+
+def test_only_our_functions_are_compiled_quickly():
+    levels = [numba.config.OPT]
+    with compiling_quickly():
+        levels.append(numba.config.OPT)
+        assert numba.njit(lambda x: _through(x) + 1)(2.5) == 26.0
+        levels.append(numba.config.OPT)
+    assert levels == [numba.config.OPT] * 3
+
+
+CHANGED = """
+import warnings
+import numba
+import numba.core.typed_passes as passes
+del passes.{gone}  # as if numba had another name for it; numba itself has its own reference
+with warnings.catch_warnings(record=True) as said:
+    warnings.simplefilter("always")
+    import shield, shield.controller, shield.plans
+for warning in said:
+    print(warning.message)
+table = shield.PRESETS["simulator"]
+print(shield.d_min_same_direction(20.0, 15.0, table.ego, table.other))
+print(shield.d_min_lateral(1.0, -0.5, table.ego, table.other))
+"""
+
+
+def test_where_numba_has_changed_functions_are_compiled_in_its_own_way(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", CHANGED.format(gone="NativeLowering")],
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parent.parent)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    said, *values = done.stdout.splitlines()
+    table = shield.PRESETS["simulator"]
+    assert "NativeLowering" in said and "numba's own way" in said, done.stderr
+    assert [float(value) for value in values] == [
+        shield.d_min_same_direction(20.0, 15.0, table.ego, table.other),
+        shield.d_min_lateral(1.0, -0.5, table.ego, table.other),
+    ]

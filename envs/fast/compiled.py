@@ -1,18 +1,14 @@
 """How the engine is compiled, and when again."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numba
 
 from envs.fast.blas import ROUNDING
-from shield.compiled import cached_for, fingerprint, inner
-from shield.parts import APART, MERGED, PLAIN, UNWRAPPED, also_outside, only_inside
+from shield.compiled import APART, MERGED, PLAIN, also_outside, fingerprint, inner, only_inside
 
 _njit: Any = numba.njit  # its published types lack some options
-_config: Any = numba.config
 
 # What has one caller only becomes part of its source and is never compiled alone, which saves compile time.
 unfolded = _njit(**PLAIN, inline="always")
@@ -20,7 +16,7 @@ unfolded = _njit(**PLAIN, inline="always")
 
 def callable_too(function):
     """What Python calls as well, outside the loops."""
-    return also_outside(_njit(**PLAIN, **MERGED)(function))
+    return also_outside(function, **PLAIN, **MERGED)
 
 
 def compiled(function):
@@ -28,7 +24,7 @@ def compiled(function):
 
     Where it is large or called from several places, it stays a function of its own there.
     """
-    return only_inside(_njit(**PLAIN, **UNWRAPPED, **APART)(function))
+    return only_inside(function, **PLAIN, **APART)
 
 
 # An inner function merged into its callers: calls hand over tuples of arrays field by field, which may cost more
@@ -42,21 +38,9 @@ def kernel(function):
     As in `shield.compiled`, any change in what the kernel may be made of compiles it anew, and so does another
     way of numpy's to round: numba's cache knows the processor, but not what numpy makes of it.
     """
-    dispatcher = _njit(cache=True, nogil=True, no_cfunc_wrapper=True, **PLAIN, **APART)(function)
-    return also_outside(cached_for(dispatcher, f"{fingerprint(*sources())} {ROUNDING}"))
+    return also_outside(function, f"{fingerprint(*sources())} {ROUNDING}", nogil=True, **PLAIN, **APART)
 
 
 def sources() -> list[Path]:
     """Files that the kernel may be made of, beside those of `shield/`."""
     return sorted(Path(__file__).parents[1].rglob("*.py"))
-
-
-@contextmanager
-def compiling_quickly() -> Iterator[None]:
-    """Compile at LLVM's first level of optimisation: the kernel is ready sooner and runs as fast."""
-    level = _config.OPT
-    _config.OPT = type(level)(1)
-    try:
-        yield
-    finally:
-        _config.OPT = level

@@ -166,7 +166,9 @@ _DESTINATIONS: dict[int, tuple[str, ...]] = {
 MOST_CARS = 64
 
 
-def compile_scenario(env_id: str, config: dict | None = None, capacity: int | None = None) -> Scenario:
+def compile_scenario(
+    env_id: str, config: dict | None = None, capacity: int | None = None, max_episode_steps: int | None = None
+) -> Scenario:
     """Everything the engine needs to run an environment.
 
     Args:
@@ -175,6 +177,7 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
       capacity: road users that there is room for where traffic comes and goes. None = as many as can
         appear in an episode, at most `MOST_CARS`. The engine raises `OverflowError` when a car finds
         no room.
+      max_episode_steps: decisions after which an episode is cut off; None = as many as in highway-env.
 
     Raises:
       ValueError: the environment or something in its configuration is not supported; the message
@@ -186,7 +189,7 @@ def compile_scenario(env_id: str, config: dict | None = None, capacity: int | No
     asked = ((config or {}).get("action") or {}).get("type", "DiscreteMetaAction")
     if scenario in (MERGE, TWO_WAY, ROUNDABOUT) and asked != "DiscreteMetaAction":
         raise Unsupported(f"action type {asked} in {env_id}", "DiscreteMetaAction")  # nor does highway-env
-    wrapped = make_stock(env_id, config=config)
+    wrapped = make_stock(env_id, config=config, max_episode_steps=max_episode_steps)
     env: Any = wrapped.unwrapped
     given = env.config
     _check(given)

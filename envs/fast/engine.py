@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import typeof
 
-from envs.fast.compiled import compiled, compiling_quickly, kernel, merged, unfolded
+from envs.fast.compiled import compiled, kernel, merged, unfolded
 from envs.fast.config import Scenario
 from envs.fast.draws import load_generator
 from envs.fast.drivers import take_meta_action
@@ -46,7 +46,7 @@ from envs.fast.threads import Crew
 from envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from envs.highway import PLANS, Settings
 from envs.wrapper import scheme_of
-from shield.compiled import rare
+from shield.compiled import compiling_quickly, rare
 from shield.junction import CROSSING
 from shield.params import PRESETS, Rules
 

@@ -23,6 +23,7 @@ from shield.command import Command
 from shield.compiled import rare
 from shield.controller import Body, Response, find_danger, respond
 from shield.geometry import largest_half_extents
+from shield.held_back import held_by
 from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame
 from shield.plans import Scene
 from shield.response import MEMORY, catch_up
@@ -239,6 +240,9 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
         settings.overrides,
     )
     if settings.overrides:
+        if report.overridden and step.partner < 0:
+            held = held_by(scene, car.acceleration, n, not settings.waits_anywhere)
+            step.partner = car_of(held, episode) if held >= 0 else -1
         step.acceleration_change = max(step.acceleration_change, abs(report.acceleration - car.acceleration))
         car.acceleration = report.acceleration
     _count(episode, step, report, report, report.pairs, report.broken, settings.overrides)

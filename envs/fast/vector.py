@@ -1,11 +1,13 @@
 """The engine as a `gymnasium.vector.VectorEnv`."""
 
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from envs.arguments import seed_of, whole
 from envs.fast.config import Scenario
 from envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
 from envs.fast.infos import info_of, step_infos
@@ -40,7 +42,8 @@ class FastVectorEnv(VectorEnv):
 
     Infos are dictionaries of arrays `[E]`; `info(e)` builds the dictionary of one environment. A
     key "_name" marks where "name" is valid: `raw_reward` and `is_success` are not where an episode has just
-    begun, and `action` is 0 there. `final_info["episode"]` holds return "r" and length "l".
+    begun, and `action` is 0 there. Where an episode ended, "episode" holds its return "r", length "l" and duration on
+    the clock "t" [s]: in `final_info` if episodes begin in the same step, else in the infos themselves.
 
     Args:
       scenario: what to run.
@@ -76,6 +79,7 @@ class FastVectorEnv(VectorEnv):
         self._decided = np.zeros(num_envs, bool)  # not where the last call began an episode
         self._seeded = False
         self._infos: dict = {}
+        self._began = np.full(num_envs, perf_counter())
 
     def reset(self, *, seed=None, options=None):
         """Begin episodes everywhere, or where `options["reset_mask"]` `[E]` says so."""
@@ -87,6 +91,7 @@ class FastVectorEnv(VectorEnv):
         outputs = self.engine.reset(mask)
         restarted = self._everywhere if mask is None else np.asarray(mask, bool)
         self.recording.begin(restarted)
+        self._began[restarted] = perf_counter()
         self._decided = np.zeros(self.num_envs, bool)
         self._infos = self._told(outputs.steps, self._decided)
         return self._shaped(outputs.observations), _marked(self._infos, restarted, self._decided)
@@ -111,8 +116,13 @@ class FastVectorEnv(VectorEnv):
         self._decided = ~ended if same_step else ~began if next_step else self._everywhere
         self._infos = self._told(outputs.steps, self._decided, actions)
         infos = _marked(self._infos, self._everywhere, self._decided)
-        if same_step and ended.any():
-            infos |= self._finals(outputs, ended, actions)
+        if ended.any():
+            if same_step:
+                infos |= self._finals(outputs, ended, actions)
+            else:
+                episode = {name: np.where(ended, values, 0) for name, values in self._episode(outputs.steps).items()}
+                infos |= _marked({"episode": episode}, ended)
+        self._began[ended if same_step else began] = perf_counter()
         return self._shaped(outputs.observations), outputs.rewards, outputs.terminated, outputs.truncated, infos
 
     def info(self, e: int) -> dict:
@@ -124,9 +134,8 @@ class FastVectorEnv(VectorEnv):
         self.engine.close()
 
     def _finals(self, outputs: Outputs, ended, actions) -> dict:
-        steps = outputs.final_steps
-        finals = self._told(steps, ended, actions)
-        finals["episode"] = {"r": steps["episode_return"], "l": steps["episode_length"]}
+        finals = self._told(outputs.final_steps, ended, actions)
+        finals["episode"] = self._episode(outputs.final_steps)
         return {
             "final_obs": self._shaped(outputs.final_observations),
             "_final_obs": ended,
@@ -144,6 +153,10 @@ class FastVectorEnv(VectorEnv):
             infos["shield"]["proposed_action"] = infos["action"]
         return infos
 
+    def _episode(self, steps: np.ndarray) -> dict:
+        lasted = np.round(perf_counter() - self._began, 6)
+        return {"r": steps["episode_return"], "l": steps["episode_length"], "t": lasted}
+
     def _seeds(self, seed) -> list[int | None]:
         if seed is None:
             if self._seeded:
@@ -151,20 +164,23 @@ class FastVectorEnv(VectorEnv):
             seed = int(np.random.SeedSequence().generate_state(1)[0])
         self._seeded = True
         if np.ndim(seed) == 0:
-            return [int(seed) + e for e in range(self.num_envs)]
+            first = whole("seed", seed, 0)
+            return [first + e for e in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise ValueError(f"{len(seed)} seeds given; expected {self.num_envs}")
-        return list(seed)
+        return [seed_of(one) for one in seed]
 
     def _commands(self, actions: np.ndarray):
-        if len(actions) != self.num_envs:
-            raise ValueError(f"{len(actions)} actions given; expected {self.num_envs}")
+        if actions.ndim == 0 or len(actions) != self.num_envs:
+            given = f"actions = {actions}" if actions.ndim == 0 else f"{len(actions)} actions given"
+            raise ValueError(f"{given}; expected {self.num_envs}")
         count = len(self.scenario.labels)
         if count:
             if not np.issubdtype(actions.dtype, np.integer) or actions.min() < 0 or actions.max() >= count:
                 raise ValueError(f"actions = {actions}: expected integers from 0 to {count - 1}")
             return actions.astype(np.int64), None
-        if actions.shape != self.action_space.shape or not np.isfinite(actions).all():
+        numbers = np.issubdtype(actions.dtype, np.number) and np.isfinite(actions).all()
+        if actions.shape != self.action_space.shape or not numbers:
             raise ValueError(f"actions = {actions}: expected finite numbers, shape {self.action_space.shape}")
         return None, self.scenario.commands(actions)
 
