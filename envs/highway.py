@@ -194,7 +194,14 @@ class ShieldedEgo:
         danger = find_danger(ego, users, *self.last, self.memory, *rules)
         response = Response(wish, False, False)
         if settings.overrides:
-            response = respond(wish, danger, ego, Body(*self.body, *bend, self.backs_up), settings.rules, settings.dt)
+            response = respond(
+                wish,
+                danger,
+                ego,
+                Body(*self.body, bend.curvature, bend.slack, self.backs_up),
+                settings.rules,
+                settings.dt,
+            )
         command = response.command
         pairs, broken = judge_frame(
             ego, users, self.memory, command, bend.curvature, settings.ego, settings.other, settings.dt

@@ -52,7 +52,7 @@ class JunctionEgo(ShieldedEgo):
 
     def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
         super().__init__(vehicle, settings, record)
-        self._measure((size_of(vehicle.LENGTH, vehicle.WIDTH),))
+        self._take_sizes((size_of(vehicle.LENGTH, vehicle.WIDTH),))
         self.crossings = np.zeros(0, CROSSING)
         self.samples = np.zeros(0, SAMPLE)
         self.cars = np.zeros(0, CAR_ON_ROAD)  # everybody on this sample, the ego last
@@ -68,7 +68,7 @@ class JunctionEgo(ShieldedEgo):
         self.may_pass: bool | None = None  # the light ahead
         self.judging = False  # a contact: who had crashed is read off the frame before
 
-    def _measure(self, sizes: tuple[Size, ...]) -> None:
+    def _take_sizes(self, sizes: tuple[Size, ...]) -> None:
         self.junction = junction_of(self.vehicle.road.network, self.clearance, self.settings.dt, sizes)
 
     def _frame(self) -> None:
@@ -243,7 +243,7 @@ class JunctionEgo(ShieldedEgo):
         sizes = [size_of(v.LENGTH, v.WIDTH) if hasattr(v, "action") else own for v in others]
         new = [size for size in dict.fromkeys(sizes) if size not in self.junction.sizes]
         if new:
-            self._measure((*self.junction.sizes, *new))
+            self._take_sizes((*self.junction.sizes, *new))
         self.size_numbers = [self.junction.sizes.index(size) for size in sizes]
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:

@@ -121,7 +121,7 @@ class FastVectorEnv(VectorEnv):
                 infos |= self._finals(outputs, ended, actions)
             else:
                 episode = {name: np.where(ended, values, 0) for name, values in self._episode(outputs.steps).items()}
-                infos |= _marked({"episode": episode}, ended)
+                infos |= _marked({"episode": episode}, ended, ended)
         self._began[ended if same_step else began] = perf_counter()
         return self._shaped(outputs.observations), outputs.rewards, outputs.terminated, outputs.truncated, infos
 
