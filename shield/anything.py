@@ -12,7 +12,6 @@ from shield.params import RSSParams
 
 _TABLES = ("rear", "front", "left", "right", "correct", "wrong")  # arguments that are `RSSParams`
 _SPEEDS = ("v_", "u_")  # how the names of speeds begin
-_PLAIN = {float, RSSParams}
 _AS_IT_IS = [np.dtype(kind) for kind in ("f8", "f4", "i8", "i4")]
 
 
@@ -29,9 +28,10 @@ def compiled_for_anything(function: Any, arrays: bool = True) -> Any:
     dispatcher = compiled_for_arrays(function)
     usual: Any = type(dispatcher)
     names = tuple(inspect.signature(function).parameters)
+    plain = tuple(RSSParams if name in _TABLES else float for name in names if name != "mode")
 
     def call(self: Any, *given: Any, **named: Any) -> Any:
-        if not named and _PLAIN.issuperset(map(type, given)):
+        if not named and tuple(map(type, given)) == plain:
             return usual.__call__(self, *given)
         positional = [_ready(self, name, value, arrays) for name, value in zip(names, given, strict=False)]
         by_name = {name: _ready(self, name, value, arrays) for name, value in named.items()}

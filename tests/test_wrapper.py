@@ -197,9 +197,9 @@ def test_an_unknown_mode_is_refused_where_it_enters():
 
 
 def test_a_response_time_below_one_frame_is_refused():
-    slow = PRESETS["simulator"].ego  # 2/15 s, but a frame of highway-fast-v0 lasts 1/5 s
+    slow = PRESETS["simulator"].ego._replace(mu=0.2)  # 2/15 s, but a frame of highway-fast-v0 lasts 1/5 s
     with pytest.raises(ValueError, match=r"response_time = 0\.133333 s .* expected >= 0\.2 s"):
-        make("highway-fast-v0", params=(slow, PRESETS["simulator"].other))
+        make("highway-fast-v0", params=(slow, slow))
     assert make("highway-v0", params=(slow, slow)).settings.ego.response_time == pytest.approx(2 / 15)
 
 
