@@ -185,9 +185,7 @@ def test_who_cannot_be_touched_does_not_count(env_id, action, distance, speed, k
         infos, done = [], False
         while not done:
             *_, terminated, truncated, info = env.step(action)
-            infos.append(
-                {name: info[name] for name in ("shield", "cost", "blame", "override_share", "min_ttc", "speed")}
-            )
+            infos.append({name: info[name] for name in keys})
             done = terminated or truncated
         assert info["blame"] == ""
         return infos
