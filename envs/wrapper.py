@@ -50,6 +50,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
     In mode "override" a command that RSS does not permit is replaced by the proper response; in
     mode "monitor" nothing is changed and the trajectory is the bare environment's, bit for bit.
     Observations are never changed; rewards only by `intervention_penalty`.
+    The shield is on whichever vehicle is the ego at a step; it is copied with its vehicle.
 
     Every info has
 
@@ -105,7 +106,8 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
 
     Raises:
       ValueError: unsupported environment, action type or mode; bad parameters; a response time
-        below one simulation frame.
+        below one simulation frame; more decisions than frames; a shield around a shield; at a step, an ego that is
+        not on the environment's road.
     """
 
     def __init__(

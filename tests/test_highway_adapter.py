@@ -160,7 +160,7 @@ def place_ghost(road, distance, speed, kind=MDPVehicle):
     lane = ego.lane
     s = lane.local_coordinates(ego.position)[0] + distance
     ghost = kind(road, lane.position(s, 0.0), lane.heading_at(s), speed)
-    ghost.collidable = False
+    ghost.collidable, ghost.route = False, []
     (road.objects if kind is Obstacle else road.vehicles).append(ghost)
     return ghost
 
@@ -176,6 +176,8 @@ def place_ghost(road, distance, speed, kind=MDPVehicle):
     ],
 )
 def test_who_cannot_be_touched_does_not_count(env_id, action, distance, speed, kind, config, mode):
+    keys = ("shield", "cost", "blame", "override_share", "min_ttc", "speed")
+
     def told(ghosts):
         env = make(env_id, shield=mode, config=config | {"duration": 8})
         env.reset(seed=0)
@@ -184,9 +186,7 @@ def test_who_cannot_be_touched_does_not_count(env_id, action, distance, speed, k
         infos, done = [], False
         while not done:
             *_, terminated, truncated, info = env.step(action)
-            infos.append(
-                {name: info[name] for name in ("shield", "cost", "blame", "override_share", "min_ttc", "speed")}
-            )
+            infos.append({name: info[name] for name in keys})
             done = terminated or truncated
         assert info["blame"] == ""
         return infos
@@ -197,7 +197,7 @@ def test_who_cannot_be_touched_does_not_count(env_id, action, distance, speed, k
 def test_a_car_that_becomes_touchable_counts_from_then_on():
     road = straight_road(lanes=1)
     ego = shielded(road)
-    ghost = place_ghost(road, 90.0, 5.0)
+    ghost = place_ghost(road, 100.0, 5.0, Vehicle)
     drive(road, 5)
     assert ego.dangerous_pairs == 0
     assert len(ego.others) == 0
