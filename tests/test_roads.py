@@ -132,27 +132,17 @@ def test_as_long_as_danger_lasts_who_is_ahead_on_a_ring_stays_ahead(radius, piec
     assert gaps == pytest.approx(np.full(600, gap), abs=1.0)
 
 
-@pytest.mark.parametrize(("radius", "length"), [(70.0, 9.0), (120.0, 25.0), (45.0, 14.0)])
+@pytest.mark.parametrize(("radius", "length"), [(70.0, 1.2), (120.0, 1.0), (60.0, 1.3)])
 @pytest.mark.parametrize("turn", [-1, 1])
 def test_a_danger_that_begins_on_another_piece_of_the_road_is_not_inherited(radius, length, turn):
-    """The frame before counts as it is along the new piece: who was at a safe distance by that, has kept it."""
-    names = [str(i) for i in range(int(1.4 * np.pi * radius / length) + 1)]
-    network, end = chain([Element(turn / radius, length)] * (len(names) - 1), names)
-    chain([Element(0.0, 400.0)], [names[-1], "end"], network, end)
+    """The frame before counts as it is along the new piece, and the ego is on a new one on every frame here."""
+    names = [str(i) for i in range(int(130.0 / length) + 1)]
+    network, _ = chain([Element(turn / radius, length)] * (len(names) - 1), names)
     road = road_of(network)
-    at = 3 if length < 20 else 1
-    vehicle = put(road, (names[at], names[at + 1], 0), 5.0, 20.0, MDPVehicle, target_speed=20.0)
+    vehicle = put(road, (names[3], names[4], 0), 0.5, 20.0, MDPVehicle, target_speed=20.0)
     ego = shield_on(vehicle)
-    parked = put(road, (names[at], names[at + 1], 0), 5.0, 0.0)
-    lane = network.get_lane((names[at], names[at + 1], 0))
-    ahead = 85.0
-    index = at
-    along = 5.0 + ahead
-    while along > lane.length:
-        along -= lane.length
-        index += 1
-        lane = network.get_lane((names[index], [*names, "end"][index + 1], 0))
-    parked.position, parked.heading = lane.position(along, 0.0), lane.heading_at(along)
+    ahead = 3 + int(95.0 / length)
+    put(road, (names[ahead], names[ahead + 1], 0), 0.5, 0.0)
     drive(road, ego, 120)
     assert ego.contact is None and vehicle.speed == 0.0
     assert ego.memory["since"][0] > 0 and ego.memory["axes"][0] != NEVER
