@@ -126,6 +126,26 @@ def test_an_ego_that_may_move_to_neither_side_stays_where_it_is_in_the_lane(shap
     assert np.ptp(offsets) < 0.06
 
 
+@pytest.mark.parametrize("radius", [35.0, 60.0, 140.0])
+@pytest.mark.parametrize("turn", [-1, 1])
+def test_an_ego_in_a_bend_may_begin_to_move_to_either_side(radius, turn):
+    """As on a straight road, although it is not parallel to the lane."""
+    network, dt, speed = build([(turn / radius, 80.0)]), 1 / 15, 18.0
+    road = road_through(network, ("0", "1", 0))
+    x, y, along = on(network, 40.0)
+    turning = turn * 2.5 / radius  # slip that turns the car as fast as the lane
+    heading = along - turning + turn * speed * dt / (2 * radius)
+    ego = record(road, (x, y, heading), on(network, 40.0 - speed * dt), speed, dt)
+    body = Body(2.5, 0.7, *look_ahead(road, x, y, speed, 2.5, dt))
+    bounds = always_on(ego, TABLE.ego, Rules(), dt)
+    for sideways in (-0.03, 0.0, 0.03):
+        wish = Command(0.0, turning + sideways / speed)
+        assert restrict(wish, bounds, ego, body, Rules(), dt).slip == wish.slip
+    for sideways in (-0.3, 0.3):
+        wish = Command(0.0, turning + sideways / speed)
+        assert restrict(wish, bounds, ego, body, Rules(), dt).slip != wish.slip
+
+
 # ---------------------------------------------------------------- who is blamed
 
 

@@ -12,6 +12,7 @@ from envs.random_roads import Element, Pose, advance, lane_beside
 from envs.roads import heading_of, reach_of, road_through
 from shield import PRESETS, Rules
 from shield.geometry import AROUND, locate, nearest_piece
+from shield.response import NEVER
 
 DT = 1 / 15
 TABLE = PRESETS["simulator"]
@@ -115,6 +116,36 @@ def test_on_a_ring_everybody_is_ahead_or_behind_by_less_than_the_way_round_and_c
     assert (np.abs(gaps) < around).all()
     assert jumps.any() and (steps[~jumps] < 11.0).all()  # less where the frame moves with the ego to another lane
     assert steps[jumps] == pytest.approx(around[1:][jumps], abs=2.5)
+
+
+@pytest.mark.parametrize(("radius", "pieces", "turn"), [(40.0, 2, 1), (45.0, 5, -1), (60.0, 3, 1)])
+@pytest.mark.parametrize("gap", [-11.0, 11.0])
+def test_as_long_as_danger_lasts_who_is_ahead_on_a_ring_stays_ahead(radius, pieces, turn, gap):
+    road = road_of(ring(radius, pieces, turn))
+    speeds = {"target_speed": 14.0, "target_speeds": [13, 14, 15]}
+    vehicle = put(road, ("0", str(1 % pieces), 0), 15.0, 14.0, MDPVehicle, **speeds)
+    ego = shield_on(vehicle, overrides=False)
+    put(road, ("0", str(1 % pieces), 0), 15.0 + gap, 14.0, MDPVehicle, **speeds)
+    drive(road, ego, 600)
+    gaps = np.array([frame.users["s"][0] - frame.ego["s"] for frame in ego.record])
+    assert len(gaps) == 600 and ego.memory["since"][0] > 500
+    assert gaps == pytest.approx(np.full(600, gap), abs=1.0)
+
+
+@pytest.mark.parametrize(("radius", "length"), [(70.0, 1.2), (120.0, 1.0), (60.0, 1.3)])
+@pytest.mark.parametrize("turn", [-1, 1])
+def test_a_danger_that_begins_on_another_piece_of_the_road_is_not_inherited(radius, length, turn):
+    """The frame before counts as it is along the new piece, and the ego is on a new one on every frame here."""
+    names = [str(i) for i in range(int(130.0 / length) + 1)]
+    network, _ = chain([Element(turn / radius, length)] * (len(names) - 1), names)
+    road = road_of(network)
+    vehicle = put(road, (names[3], names[4], 0), 0.5, 20.0, MDPVehicle, target_speed=20.0)
+    ego = shield_on(vehicle)
+    ahead = 3 + int(95.0 / length)
+    put(road, (names[ahead], names[ahead + 1], 0), 0.5, 0.0)
+    drive(road, ego, 120)
+    assert ego.contact is None and vehicle.speed == 0.0
+    assert ego.memory["since"][0] > 0 and ego.memory["axes"][0] != NEVER
 
 
 # ---------------------------------------------------------------- forks
