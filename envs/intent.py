@@ -330,16 +330,18 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
     for i in range(len(cars)):
         car = cars[i]
         samples[i].x, samples[i].y, samples[i].speed = car.x, car.y, car.speed
-        samples[i].wreck, samples[i].astray, samples[i].lanes = car.wreck, False, 0
+        samples[i].wreck, samples[i].astray, samples[i].lanes, samples[i].path = car.wreck, False, 0, -1
         samples[i].alert = car.alert
         before = count
         if not car.wreck:
             if intent == KNOWN and car.lane >= 0 and car.choice >= 0:
+                path = samples[i].path = _path_kept(roads, car, memory[i].path if memory[i].age > 0 else -1)
                 if _fits(roads.lanes[car.lane], car, _BEYOND_KNOWN, _OFF_KNOWN, _TURNED_KNOWN):
                     count = _add(roads, track, car.lane, car.choice, i, car, v_cap, threats, count)
                     samples[i].lanes = 1 << car.lane
                 s, lateral = local_coordinates(roads.lanes[car.lane], car.x, car.y)
-                path = roads.choices[car.choice, 0] + car.size * len(roads.paths.boxes)
+                if before < count and before < len(threats):  # the first is the one that it keeps to
+                    _put_on_path(roads, track, path, s, car.lane, threats[before])
                 left = _lane_left(roads, car, path, s + roads.paths.offset[path, car.lane], lateral)
                 if left >= 0:
                     count = _add(roads, track, left, roads.through[left], i, car, v_cap, threats, count)
@@ -413,13 +415,31 @@ def _add(roads, track, lane, row, i, car, v_cap, threats, count):
         path += car.size * len(roads.paths.boxes)
         if count < len(threats):
             threat = threats[count]
-            threat.user, threat.path = i, path
-            threat.s, threat.v = roads.paths.offset[path, lane] + s, car.speed
+            threat.user, threat.v = i, car.speed
             threat.cap = min(v_cap, roads.limit)
-            threat.half_length, threat.wreck = 0.5 * car.length, False
-            threat.priority, threat.red_for = roads.paths.priority[track.path, path], 0.0
+            threat.half_length, threat.wreck, threat.red_for = 0.5 * car.length, False, 0.0
+            _put_on_path(roads, track, path, s, lane, threat)
         count += 1
     return count
+
+
+@compiled
+def _put_on_path(roads, track, path, s, lane, threat):
+    """Note that a way leads along a path, with the car at `s` [m] of one of its lanes."""
+    threat.path, threat.s = path, roads.paths.offset[path, lane] + s
+    threat.priority = roads.paths.priority[track.path, path]
+
+
+@compiled
+def _path_kept(roads, car, before):
+    """Path of a car's announced route: the one from `before` while that leads on likewise, -1 = it had none.
+
+    Paths that go on in the same way may have come from elsewhere, and then hold other cars until they have settled.
+    """
+    path = roads.choices[car.choice, 0] + car.size * len(roads.paths.boxes)
+    if before < 0 or np.isnan(roads.paths.offset[before, car.lane]) or roads.alongside[before, car.lane] != path:
+        return path
+    return before
 
 
 @compiled

@@ -32,6 +32,7 @@ from shield.risk import RiskSettings
 
 MODES = ("override", "monitor")
 WAITING = ("line", "anywhere")
+LOWEST_FREQUENCY = 5  # of simulation where roads cross [Hz]
 SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
     "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
@@ -350,6 +351,11 @@ def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dic
     ego = params.ego._replace(response_time=float(frames_for(max(rho, dt), dt) * dt))
     other = params.other._replace(response_time=float(frames_for(params.other.response_time, dt) * dt))
     scheme = scheme_of(env)
+    if scheme == PLANS and dt > 1 / LOWEST_FREQUENCY + 1e-9:
+        raise ValueError(
+            f"config simulation_frequency = {env.config['simulation_frequency']}: expected >= {LOWEST_FREQUENCY} where "
+            "roads cross, because plans look at single frames"
+        )
     if scheme == PLANS:  # the paths hold everybody's width at any speed, so lateral speeds need no limit
         rules = rules._replace(limits=False)
     return Settings(ego, other, rules, mode == "override", dt, scheme, **conduct)

@@ -80,6 +80,7 @@ CROSSING = np.dtype(
         ("relied", "?"),  # is counted on to give way on this frame
         ("relied_before", "?"),  # was so on the frame before
         ("way", "i8"),  # path of the ego then
+        ("path", "i8"),  # path that its announced route followed then, -1 = none announced
         ("wreck", "?"),  # at the last sample
         ("astray", "?"),  # was on no path then
         ("x", "f8"),  # at the last sample
@@ -104,6 +105,7 @@ SAMPLE = np.dtype(
         ("lanes", "i8"),  # lanes on which it may be, as a set of bits
         ("next_lanes", "i8"),  # these and the ones that follow
         ("reachable", "i8"),  # those, and lanes beside them
+        ("path", "i8"),  # path that its announced route follows, -1 = none announced
         ("wreck", "?"),
         ("astray", "?"),  # on no lane at all
         ("alert", "?"),  # is known to wait: nobody counts on it to stand
@@ -410,7 +412,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
         kept = _is_resolute(scene, a)
     memory.follows, memory.way = may_follow, scene.track.path
     memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
-    memory.reachable = sample.reachable
+    memory.reachable, memory.path = sample.reachable, sample.path
     memory.wreck, memory.astray = sample.wreck, sample.astray
     memory.age += 1
     memory.relied, memory.relied_before = False, memory.relied

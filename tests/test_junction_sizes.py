@@ -34,9 +34,9 @@ class Motorcycle(IDMVehicle):
     LENGTH, WIDTH = 2.2, 0.8
 
 
-def meet(env_id, kind, lane, s, speed, decisions=12, seed=0, route="o1"):
+def meet(env_id, kind, lane, s, speed, decisions=12, seed=0, route="o1", intent="any"):
     """Play full throttle with one other road user on the road; returns the last info, and the two."""
-    env = make(env_id, config={"duration": decisions})
+    env = make(env_id, config={"duration": decisions}, intent=intent)
     env.reset(seed=seed)
     base = env.unwrapped
     base.config["spawn_probability"] = 0
@@ -66,7 +66,7 @@ def meet(env_id, kind, lane, s, speed, decisions=12, seed=0, route="o1"):
 
 
 @pytest.mark.parametrize("kind", [Truck, Bus, Wide, Motorcycle])
-@pytest.mark.parametrize(("ahead", "speed"), [(16.0, 0.0), (22.0, 1.0), (30.0, 4.0)])
+@pytest.mark.parametrize(("ahead", "speed"), [(21.0, 0.0), (24.0, 1.0), (30.0, 4.0)])
 def test_the_ego_does_not_drive_into_whoever_is_ahead_on_its_lane(kind, ahead, speed):
     info, _, _ = meet("intersection-v0", kind, None, ahead, speed)
     assert info["blame"] == ""
@@ -83,18 +83,19 @@ def test_nor_into_a_leader_of_any_size_on_the_way_to_a_ring(kind):
 @pytest.mark.parametrize("kind", [Truck, Bus, Wide])
 @pytest.mark.parametrize("arm", [1, 2, 3])
 def test_nor_into_whoever_crosses(kind, arm):
-    info, _, _ = meet("intersection-v0", kind, (f"o{arm}", f"ir{arm}", 0), 62.0, 8.0, route=f"o{(arm + 2) % 4}")
+    lane = (f"o{arm}", f"ir{arm}", 0)
+    info, _, _ = meet("intersection-v0", kind, lane, 62.0, 8.0, route=f"o{(arm + 2) % 4}", intent="known")
     assert info["blame"] == ""
     assert info["episode_broken_duties"] == 0
 
 
-def test_an_ego_behind_a_truck_stops_further_away_than_behind_a_car():
-    def gap(kind):
-        _, ego, other = meet("intersection-v0", kind, None, 26.0, 0.0)
-        return np.hypot(*(other.position - ego.position))
+def test_behind_a_truck_the_ego_stops_as_far_from_its_rear_as_from_that_of_a_car():
+    def gap(kind, ahead):
+        _, ego, other = meet("roundabout-v0", kind, None, ahead, 0.0, route="nxs")
+        return np.hypot(*(other.position - ego.position)) - 2.5 - 0.5 * kind.LENGTH
 
-    longer = gap(Truck) - gap(IDMVehicle)
-    assert 2.9 < longer < 4.6  # half of 12 m instead of half of 5 m, in cells of half a metre
+    for kind in (Truck, Bus, Motorcycle):
+        assert 0.2 < gap(kind, 13.0 + 0.5 * kind.LENGTH) < gap(IDMVehicle, 15.5) + 1.0
 
 
 def test_sizes_are_rounded_up_and_those_on_the_grid_are_exact():
