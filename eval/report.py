@@ -111,7 +111,7 @@ def write_cell(path: Path, episodes: pd.DataFrame, arm: str, seed: int, test: st
 
 def read_cell(path: Path) -> pd.DataFrame:
     """Read episodes as they were written; a float keeps its last bit."""
-    return pd.read_csv(path, float_precision="round_trip")
+    return pd.read_csv(path)
 
 
 if __name__ == "__main__":
