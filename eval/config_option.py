@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from eval.files import to_json
 
 PREFIX = "--config."
@@ -17,7 +19,7 @@ def read_config(text: str) -> dict[str, Any]:
     """A configuration from a file, or from JSON itself.
 
     Args:
-      text: path of a .json, .toml, .yaml or .yml file (the last two if PyYAML is installed), or "{...}".
+      text: path of a .json, .toml, .yaml or .yml file, or "{...}".
 
     Raises:
       ValueError: says what cannot be read.
@@ -41,15 +43,8 @@ def _parsed(content: str, kind: str, source: str) -> Any:
             return json.loads(content)
         if kind == "toml":
             return tomllib.loads(content)
-    except ValueError as error:
-        raise ValueError(f"{source} cannot be read: {error}") from None
-    try:
-        import yaml
-    except ImportError:
-        raise ValueError(f"{source}: YAML needs the package PyYAML; JSON and TOML need none") from None
-    try:
         return yaml.safe_load(content)
-    except yaml.YAMLError as error:
+    except (ValueError, yaml.YAMLError) as error:
         raise ValueError(f"{source} cannot be read: {' '.join(str(error).split())}") from None
 
 
