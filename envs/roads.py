@@ -185,8 +185,7 @@ def _pieces_of(lane: Any, shift: float = 0.0) -> list[tuple[float, ...]]:
 
 def tightest(network: Any) -> float:
     """Largest curvature of any arc of a network [1/m]."""
-    pieces = [piece for lane in network.lanes_list() for piece in _pieces_of(lane)]
-    return max((abs(piece[CURVATURE]) for piece in pieces), default=0.0)
+    return max((1.0 / lane.radius for lane in network.lanes_list() if isinstance(lane, CircularLane)), default=0.0)
 
 
 def reach_of(ego: RSSParams, other: RSSParams, dt: float) -> float:

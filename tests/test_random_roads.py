@@ -38,6 +38,19 @@ def test_on_bends_at_a_low_frequency_the_ego_is_not_to_blame_either(kind, seed):
     assert info["blame"] not in ("ego", "both", "none")
 
 
+@pytest.mark.parametrize(("kind", "seed"), [("ring", 43), ("ring", 77), ("fork", 34), ("chain", 38)])
+def test_the_audit_of_the_record_counts_what_the_shield_counted(kind, seed):
+    env = make("random-roads-v0", config={"kind": kind}, record=True)
+    env.reset(seed=seed)
+    done = False
+    while not done:
+        *_, terminated, truncated, info = env.step(FASTER)
+        done = terminated or truncated
+    audit = env.audit()
+    assert audit.dangerous.sum() == info["episode_dangerous_pairs"] > 0
+    assert (audit.duty > 0).sum() == info["episode_broken_duties"] == 0
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_networks_are_as_different_as_they_should_be(kind):
     lanes, radii, lengths, oncoming, ends = set(), [], [], set(), 0

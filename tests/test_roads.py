@@ -132,6 +132,20 @@ def test_as_long_as_danger_lasts_who_is_ahead_on_a_ring_stays_ahead(radius, piec
     assert gaps == pytest.approx(np.full(600, gap), abs=1.0)
 
 
+@pytest.mark.parametrize(("radius", "pieces", "turn"), [(20.0, 3, 1), (25.0, 2, -1), (30.0, 4, 1)])
+def test_in_danger_nobody_is_taken_for_a_follower_who_is_ahead(radius, pieces, turn):
+    road = road_of(ring(radius, pieces, turn))
+    vehicle = put(road, ("0", str(1 % pieces), 0), 4.0, 9.0, MDPVehicle)
+    ego = shield_on(vehicle, overrides=False)
+    other = put(road, ("0", str(1 % pieces), 0), 14.0, 3.0)
+    drive(road, ego, 2)
+    assert ego.memory["since"][0] > 0
+    other.speed = 40.0  # all the way round it would not be far enough behind
+    drive(road, ego, 1)
+    gap = ego.record[-1].users["s"][0] - ego.record[-1].ego["s"]
+    assert len(ego.record) == 3 and 0.0 < gap < 15.0
+
+
 @pytest.mark.parametrize(("radius", "length"), [(70.0, 1.2), (120.0, 1.0), (60.0, 1.3)])
 @pytest.mark.parametrize("turn", [-1, 1])
 def test_a_danger_that_begins_on_another_piece_of_the_road_is_not_inherited(radius, length, turn):
@@ -143,9 +157,13 @@ def test_a_danger_that_begins_on_another_piece_of_the_road_is_not_inherited(radi
     ego = shield_on(vehicle)
     ahead = 3 + int(95.0 / length)
     put(road, (names[ahead], names[ahead + 1], 0), 0.5, 0.0)
-    drive(road, ego, 120)
+    dangers = []
+    for _ in range(120):
+        drive(road, ego, 1)
+        if ego.memory["since"][0] > 0:
+            dangers.append(ego.memory["axes"][0])
     assert ego.contact is None and vehicle.speed == 0.0
-    assert ego.memory["since"][0] > 0 and ego.memory["axes"][0] != NEVER
+    assert dangers and NEVER not in dangers
 
 
 # ---------------------------------------------------------------- forks
@@ -170,9 +188,9 @@ def test_a_car_that_is_parked_on_another_branch_is_not_in_the_way(order):
         vehicle = put(road, ("a", "b", 0), 10.0, 20.0, MDPVehicle).plan_route_to(branch + branch)
         ego = shield_on(vehicle)
         for other in set(order) - {branch}:
-            put(road, ("b", other, 0), 60.0, 0.0)
+            put(road, ("b", other, 0), 32.0, 0.0)
         drive(road, ego, 110)
-        assert ego.contact is None and vehicle.speed > 15.0
+        assert ego.contact is None and min(frame.ego["speed"] for frame in ego.record) > 18.0
 
 
 @pytest.mark.parametrize(("order", "branch"), [("lr", "l"), ("lr", "r"), ("srl", "l"), ("lsr", "r")])
