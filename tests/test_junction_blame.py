@@ -13,7 +13,7 @@ from shield.blame import CUT_IN, DUTIES, INHERITED, KEPT, LEFT_NO_PLAN, OTHER, T
 from shield.blame import EGO as AT_FAULT
 from shield.conflict_areas import cell_of
 from shield.junction import CROSSING, SAMPLE, judge_crossing
-from shield.plans import ANY, THREAT, Track
+from shield.plans import ANY, THREAT, Track, farthest
 
 EVERY_FRAME = {"policy_frequency": 15, "duration": 11 * 15}
 
@@ -205,3 +205,6 @@ def test_a_wreck_is_in_the_way_of_everything_that_it_may_roll_to(path, speed):
     assert threats["from_cell"][0] <= cell_of(50.0 - 5.0, paths.cells[path])
     assert threats["to_cell"][0] >= cell_of(s + 5.0, paths.cells[path])
     assert threats["to_cell"][0] <= cell_of(s + 5.0 + 2.0, paths.cells[path])
+    on_path = np.zeros(1, THREAT)[0]
+    on_path["s"], on_path["v"], on_path["wreck"] = 50.0, speed, True
+    assert s - 1e-6 <= farthest(on_path, 100.0, TABLE.other) < s + 1.0
