@@ -16,6 +16,7 @@ from envs.paths import (
     MARGIN_LON,
     STOCK,
     Size,
+    Swept,
     beside,
     join,
     lay_out,
@@ -146,7 +147,7 @@ class Junction:
         self._layout, self._dt = lay_out(network), dt
         own = sweep(self._layout, self.limit, dt, sizes[0])
         self._ego = widened(own, room)
-        self._swept: list = []
+        self._swept: list[Swept] = []
         self._choices = np.array(through), np.array(straight)
         self._alongside = np.array([[self._most_alike(walk, index) for index in self.number] for walk in self.walks])
         self._take_in(sizes)

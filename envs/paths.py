@@ -230,7 +230,7 @@ def _tracked(lanes, way, start, cells: int, top_speed: float, dt: float, size: S
     s = (np.arange(cells)[:, None] + np.array([0.0, 0.5, 1.0])) * CELL
     poses = [_centre(lanes, way, start, s)]
     places = max(int(np.ceil(dt / _TRACK_DT - 1e-6)), 1)
-    for share in _SHARES:
+    for share in _shares(2 * places - 1):
         speed = share * top_speed
         for length in sorted({size.shortest, size.longest}):
             for place in range(places):
@@ -239,6 +239,12 @@ def _tracked(lanes, way, start, cells: int, top_speed: float, dt: float, size: S
                 track = track[: drive(lanes, way, start, speed, dt, track, length, begin)]
                 poses.append(_interpolated(track, s, begin))
     return np.concatenate(poses, 1)
+
+
+def _shares(times: int) -> list[float]:
+    """Shares of the top speed at which a path is driven, `times` as many: the longer a frame, the more they differ."""
+    between = np.arange(1, times) / times
+    return [*_SHARES, *(a + (b - a) * part for a, b in pairwise(_SHARES) for part in between)]
 
 
 def _interpolated(track, s, begin: float) -> np.ndarray:

@@ -13,7 +13,7 @@ from shield.blame import CUT_IN, DUTIES, INHERITED, KEPT, LEFT_NO_PLAN, OTHER, T
 from shield.blame import EGO as AT_FAULT
 from shield.conflict_areas import cell_of
 from shield.junction import CROSSING, SAMPLE, judge_crossing
-from shield.plans import ANY, THREAT, Track
+from shield.plans import ANY, THREAT, Track, farthest
 
 EVERY_FRAME = {"policy_frequency": 15, "duration": 11 * 15}
 
@@ -57,11 +57,11 @@ def test_the_command_that_is_executed_is_judged_and_not_what_the_table_permits()
     """A driver of meta-actions accelerates by up to 15 m/s^2."""
     found = 0
     for ego_path, other_path in crossing_pairs()[::7]:
-        for s in np.arange(70.0, 100.0, 4.0):
-            for v in (2.0, 6.0):
+        for s in np.arange(84.0, 104.0, 0.25):
+            for v in (4.0, 8.0):
                 broken = []
                 for nominal in (EGO.a_max_accel, 13.0):
-                    duel = Duel(ego_path, other_path, s, v, 84.0, 8.0)
+                    duel = Duel(ego_path, other_path, s, v, 88.0, 8.0)
                     duel.frame(nominal, 0.0, overrides=False)
                     assert duel.report.acceleration == nominal
                     assert not duel.report.overridden
@@ -109,7 +109,7 @@ def test_who_comes_to_be_behind_the_ego_at_less_than_its_distance_is_no_follower
     """Whoever of the two has merged: the ego goes on staying clear of it."""
     duel = merged(*pair, gap)
     duel.memory["age"] = 5
-    duel.frame(-EGO.a_min_brake, 0.0, overrides=False)
+    duel.frame(0.0, 0.0, overrides=False)  # it neither brakes nor goes on
     assert not duel.threats["follows"][0] and not duel.memory["behind"][0]
     assert duel.report.pairs == 1
     assert duel.report.broken == 1
@@ -205,3 +205,6 @@ def test_a_wreck_is_in_the_way_of_everything_that_it_may_roll_to(path, speed):
     assert threats["from_cell"][0] <= cell_of(50.0 - 5.0, paths.cells[path])
     assert threats["to_cell"][0] >= cell_of(s + 5.0, paths.cells[path])
     assert threats["to_cell"][0] <= cell_of(s + 5.0 + 2.0, paths.cells[path])
+    on_path = np.zeros(1, THREAT)[0]
+    on_path["s"], on_path["v"], on_path["wreck"] = 50.0, speed, True
+    assert s - 1e-6 <= farthest(on_path, 100.0, TABLE.other) < s + 1.0
