@@ -494,5 +494,5 @@ def fail(message: str) -> NoReturn:
 
 if __name__ == "__main__":
     # worker processes are forked from a server that has imported the slow packages once
-    multiprocessing.set_forkserver_preload(["envs", "agents.ppo", "eval.jobs", "eval.rollout"])
+    multiprocessing.set_forkserver_preload(["envs", "agents.ppo", "eval.jobs", "eval.orphans", "eval.rollout"])
     main(sys.argv[1:])

@@ -427,7 +427,9 @@ def drive_to_contact(extra, b_front, a_rear, b_rear, ego_is_rear, dt=0.01):
             return {"collision": True, "t": frame * dt, "t_b": t_b, "blamed": blamed}
         remember(memory[0], assess(ego, users[0], CAR, CAR, rules, dt), ego, users[0], dt)
         t_b = frame * dt if memory[0]["since"] == 0 else t_b
-        a_front, a_rear_now = -b_front, a_rear if frame * dt < CAR.response_time else -b_rear
+        # the last step of braking is partial: nobody reverses
+        a_front = max(-b_front, -front["speed"] / dt)
+        a_rear_now = max(a_rear if frame * dt < CAR.response_time else -b_rear, -rear["speed"] / dt)
         judge_frame(ego, users, memory, Command(a_rear_now if ego_is_rear else a_front, 0.0), 0.0, CAR, CAR, dt)
         for one, a in ((rear, a_rear_now), (front, a_front)):
             one["along"] = one["speed"]

@@ -96,7 +96,9 @@ def test_a_sweep_over_response_times_has_one_judge():
 
 
 def test_a_shield_without_a_duty_is_at_fault_by_the_full_table():
-    env = make("highway-fast-v0", rules={"longitudinal": False, "lateral": False}, judge_rules=Rules())
+    env = make(
+        "highway-fast-v0", rules={"longitudinal": False, "lateral": False, "present_duties": False}, judge_rules=Rules()
+    )
     verdicts = []
     for seed in range(4):
         env.reset(seed=seed)

@@ -19,7 +19,7 @@ def episodes(arrived, length, in_way=(False,) * 4, blame=("", "", "", "other")):
             "in_way": in_way,
             "blame": blame,
             "crashed": [bool(verdict) for verdict in blame],
-            "evidence": [json.dumps(duties) if verdict else "" for verdict in blame],
+            "evidence": [json.dumps(duties) if verdict else "{}" for verdict in blame],
             "override_share": 0.5,
             "frames": 100,
             "trapped_frames": [0, 0, 3, 0],

@@ -216,10 +216,8 @@ def _same_infos(ours, theirs, path="", reset=None):
     if path == ".blame_evidence":  # the engine's is always complete
         ours = {name: ours[name] for name in theirs}
     names = {name for name in ours if not name.startswith("_")}
-    assert names == {name for name in theirs if not name.startswith("_")} - (
-        {"t"} if path.endswith("episode") else set()
-    )
-    for name in names:
+    assert names == {name for name in theirs if not name.startswith("_")}
+    for name in names - ({"t"} if path.endswith("episode") else set()):
         if isinstance(ours[name], dict):
             _same_infos(ours[name], theirs[name], f"{path}.{name}", reset)
             continue

@@ -29,7 +29,8 @@ def first_frame(name, mode, lane=1, side=0):
     Args:
       side: of the lane that the ego changes to.
     """
-    env = make("highway-v0", shield="monitor", risk=RiskSettings.validated(mode=mode))
+    one_frame = {"simulation_frequency": 1, "policy_frequency": 1}
+    env = make("highway-v0", shield="monitor", risk=RiskSettings.validated(mode=mode), config=one_frame)
     env.reset(seed=0)
     case, base = CASES[name], env.unwrapped
     road, ego = base.road, base.vehicle
@@ -45,7 +46,6 @@ def first_frame(name, mode, lane=1, side=0):
     place(other, case["source"])
     ego.target_lane_index = (*ego.lane_index[:2], ego.lane_index[2] + side)
     road.vehicles = [ego, other]
-    base.config["simulation_frequency"] = base.config["policy_frequency"]  # one frame
     env.step(1)
     assert len(env.risk_frames) == 1
     return env.risk_frames[0]
