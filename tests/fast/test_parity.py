@@ -5,8 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import lockstep
+import numpy as np
 import pytest
 from lockstep import POLICIES, compare
 from parity import BARE
