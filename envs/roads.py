@@ -133,35 +133,36 @@ def _without_ends(found: dict[LaneIndex, _Stretch]) -> dict[LaneIndex, _Stretch]
 def _links(network: Any, index: LaneIndex, shift: float, forward: bool, way: Way) -> list[tuple[LaneIndex, float, Way]]:
     """Lanes that continue a lane (or lead to it), with the shift of the road on them and the way after them.
 
-    Those that continue it without a jump, or else the nearest: the lane ends, and the road goes on beside it.
+    Those that continue it without a jump, on the planned road if there are any; or else the nearest: the lane
+    ends, and the road goes on beside it.
     """
     lane = network.get_lane(index)
     s = lane.length if forward else 0.0
     end, heading = lane.position(s, shift), lane.heading_at(s)
     joined, aside = [], []
-    for road in _roads_at(network, index, forward, way):
+    for road in _roads_at(network, index, forward):
+        planned = bool(way) and way[0] == road
         for i, other in enumerate(network.graph[road[0]][road[1]]):
             at = 0.0 if forward else other.length
             if abs(wrap_angle(heading - other.heading_at(at))) >= _TURN:
                 continue
             gap, normal = end - other.position(at, 0.0), other.position(at, 1.0) - other.position(at, 0.0)
-            across, link = float(gap @ normal), (*road, i)
-            rest = way[1:] if way and way[0] == road else ()
+            across, link, rest = float(gap @ normal), (*road, i), way[1:] if planned else ()
             if np.hypot(*gap) < _JOIN:
-                joined.append((link, 0.0, rest))
+                joined.append((planned, (link, 0.0, rest)))
             elif np.hypot(*(gap - across * normal)) < _JOIN:
-                aside.append((abs(across), (link, across, rest)))
+                aside.append((not planned, abs(across), (link, across, rest)))
     if joined or not aside:
-        return joined
-    return [min(aside, key=lambda one: one[0])[1]]
+        chosen = any(planned for planned, _ in joined)
+        return [link for planned, link in joined if planned or not chosen]
+    return [min(aside, key=lambda one: one[:2])[2]]
 
 
-def _roads_at(network: Any, index: LaneIndex, forward: bool, way: Way) -> list[tuple[str, str]]:
-    """Roads that start where a lane ends: the planned one, or all; or roads that end where it starts."""
-    if not forward:
-        return [(origin, index[0]) for origin, ends in network.graph.items() if index[0] in ends]
-    roads = [(index[1], end) for end in network.graph.get(index[1], {})]
-    return [way[0]] if way and way[0] in roads else roads
+def _roads_at(network: Any, index: LaneIndex, forward: bool) -> list[tuple[str, str]]:
+    """Roads that start where a lane ends, or that end where it starts."""
+    if forward:
+        return [(index[1], end) for end in network.graph.get(index[1], {})]
+    return [(origin, index[0]) for origin, ends in network.graph.items() if index[0] in ends]
 
 
 def _pieces_of(lane: Any, shift: float = 0.0) -> list[tuple[float, ...]]:

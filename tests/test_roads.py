@@ -216,6 +216,21 @@ def test_where_branches_lie_on_top_of_each_other_the_ego_is_on_the_one_that_it_h
     assert {free.lane_index, *heading_of(free).beside} == {("b", name, 0) for name in order}
 
 
+@pytest.mark.parametrize(("turn", "lane"), [(1, 0), (1, 1), (-1, 1)])
+def test_a_planned_road_that_another_lane_leads_to_takes_a_lane_change(turn, lane):
+    """Until then the ego is on its own lane, and the road is what that leads to."""
+    network, joint = chain([Element(0.0, 60.0)], "ab", lanes=3)
+    chain([Element(0.0, 90.0)], "bc", network, joint, lanes=3)
+    first = 2 if turn > 0 else 0
+    network.add_lane("b", "d", lane_beside(joint, Element(turn / 80, 70.0), 4.0 * first))
+    way = (("b", "d"),)
+    own, exiting = (road_through(network, ("a", "b", i), REACH, way) for i in (lane, first))
+    x, y = network.get_lane(("b", "d", 0)).position(40.0, 0.0)
+    assert abs(locate(own, x, y)[1]) > 4.0 and abs(locate(exiting, x, y)[1]) < 1e-6
+    x, y = network.get_lane(("b", "c", lane)).position(40.0, 0.0)
+    assert abs(locate(own, x, y)[1]) < 1e-6
+
+
 def test_who_may_come_from_several_roads_is_measured_along_each():
     network, joint = chain([Element(0.0, 60.0)], "xm")
     chain([Element(1 / 90, 50.0), Element(0.0, 60.0)], "mno", network, joint)

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import lockstep
 import numpy as np
 import pytest
 from lockstep import POLICIES, compare
@@ -65,6 +66,18 @@ def test_who_drives_around_a_ring_is_expected_to_leave_it():
 @pytest.mark.parametrize("policy", POLICIES)
 def test_highway_v0_agrees(policy):
     _agree(compare("highway-v0", range(1), policy, max_steps=6))
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("shield", ["override", "monitor"])
+def test_on_the_way_to_the_exit_both_look_along_the_same_road(first, shield, monkeypatch):
+    """Also where the ego heads for a road that its own lane does not lead to."""
+    right, faster = 2, 3
+    actions = iter([right, right, faster] * 200)
+    if first:
+        next(actions)
+    monkeypatch.setattr(lockstep, "actions_of", lambda *_: next(actions))
+    _agree(compare("exit-v0", range(4), config={"vehicles_count": 4}, shield=shield))
 
 
 def test_overridden_defaults_agree():
