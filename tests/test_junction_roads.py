@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from envs import make
+from envs import make, make_vec
 from envs.junction_ego import junction_of
 from envs.paths import STOCK, _starts, drive
 from shield.conflict_areas import cell_of, reach_beyond
@@ -41,6 +41,15 @@ def test_every_lane_of_a_ring_leads_to_every_exit(lanes):
 def test_more_lanes_than_sets_hold_are_refused(lanes):
     with pytest.raises(ValueError, match=rf"road network with {8 * lanes + 16} lanes: expected at most 63"):
         make(GENERIC, config={"roundabout_lanes": lanes})
+
+
+@pytest.mark.parametrize("maker", [make, lambda env_id, **options: make_vec(env_id, 1, **options)])
+@pytest.mark.parametrize(
+    ("env_id", "frequency"), [("intersection-v0", 3), ("roundabout-v0", 4), ("intersection-v2", 1)]
+)
+def test_frames_too_long_for_plans_are_refused(maker, env_id, frequency):
+    with pytest.raises(ValueError, match=rf"simulation_frequency = {frequency}: expected >= 5 where roads cross"):
+        maker(env_id, config={"simulation_frequency": frequency})
 
 
 @pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0"])

@@ -7,6 +7,9 @@ import pytest
 from highway_env.vehicle.behavior import IDMVehicle
 
 from envs import make
+from envs.fast.config import Unsupported, compile_scenario
+from envs.fast.engine import DISABLED, Engine
+from envs.fast.replay import read
 from envs.junction_ego import junction_of
 from envs.paths import STOCK, Size, size_of
 from shield.conflict_areas import HALF_LENGTH, HALF_WIDTH
@@ -140,3 +143,18 @@ def test_a_freely_steered_ego_of_another_size_is_refused():
             make("intersection-v1")
     finally:
         kind.LENGTH = before
+
+
+def test_the_engine_refuses_cars_of_another_size(monkeypatch):
+    engine = Engine(compile_scenario("intersection-v0"), 1, autoreset=DISABLED)
+    engine.reset()
+    env = make("intersection-v0", shield=None)
+    env.reset(seed=0)
+    base = env.unwrapped
+    base.road.vehicles.append(Truck(base.road, [2.0, 60.0], -np.pi / 2, 5.0))
+    batch = engine.batch
+    with pytest.raises(ValueError, match=r"vehicle of 12 m x 2.5 m: expected 5 m x 2 m"):
+        read(base, batch.cars[0], batch.episodes[0], batch.order[0], engine.scenario.network)
+    monkeypatch.setattr(IDMVehicle, "LENGTH", 7.0)
+    with pytest.raises(Unsupported, match=r"vehicles of 7 m x 2 m; expected 5 m x 2 m"):
+        compile_scenario("intersection-v0")

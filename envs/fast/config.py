@@ -15,7 +15,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from envs.fast.network import Network, compile_network
-from envs.fast.state import REWARDS
+from envs.fast.state import CAR_LENGTH, CAR_WIDTH, REWARDS
 from envs.stock import AT_INTERSECTIONS, drivers_unchanged, make_stock
 
 HIGHWAY, MERGE, TWO_WAY, EXIT, ROUNDABOUT, INTERSECTION = range(6)
@@ -241,6 +241,10 @@ def _check(given: dict) -> None:
     idm = "highway_env.vehicle.behavior.IDMVehicle"
     if given["other_vehicles_type"] != idm:
         raise Unsupported(f"other_vehicles_type = {given['other_vehicles_type']!r}", repr(idm))
+    if (IDMVehicle.LENGTH, IDMVehicle.WIDTH) != (CAR_LENGTH, CAR_WIDTH):
+        raise Unsupported(
+            f"vehicles of {IDMVehicle.LENGTH:g} m x {IDMVehicle.WIDTH:g} m", f"{CAR_LENGTH:g} m x {CAR_WIDTH:g} m"
+        )
     if given.get("controlled_vehicles", 1) != 1:
         raise Unsupported(f"controlled_vehicles = {given['controlled_vehicles']}", "1")
     if given["manual_control"]:

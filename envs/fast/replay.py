@@ -8,7 +8,7 @@ from highway_env.vehicle.kinematics import Vehicle
 
 from envs.fast.draws import generator_state, load_generator
 from envs.fast.network import Network
-from envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
+from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, TRAFFIC
 
 
 def show(env, cars: np.ndarray, network: Network, episode: np.ndarray | None = None) -> None:
@@ -91,7 +91,8 @@ def read(env, cars: np.ndarray, episode: np.ndarray, order: np.ndarray, network:
       network: of the engine's scenario.
 
     Raises:
-      ValueError: a car follows a route that none plans here, or there are more road users than room.
+      ValueError: a car follows a route that none plans here or is not of the stock size, or there are more road users
+        than room.
     """
     road = env.road
     users = [*road.vehicles, *road.objects]
@@ -124,6 +125,11 @@ def _read_user(car, user, numbers, network: Network) -> None:
     if not isinstance(user, Vehicle):
         car["kind"] = OBSTACLE
         return
+    if (user.LENGTH, user.WIDTH) != (CAR_LENGTH, CAR_WIDTH):
+        raise ValueError(
+            f"vehicle of {user.LENGTH:g} m x {user.WIDTH:g} m: expected {CAR_LENGTH:g} m x {CAR_WIDTH:g} m, the size "
+            "of every vehicle in the engine"
+        )
     car["kind"] = DIRECT
     car["steering"], car["acceleration"] = user.action["steering"], user.action["acceleration"]
     car["hit"] = user.impact is not None
