@@ -58,6 +58,9 @@ def _made(env_id: str, arguments: dict[str, Any]) -> gym.Env:
                 raise
             given = ", ".join(f"{name} = {arguments[name]!r}" for name in unknown)
             raise ValueError(f"{given}: unknown here; expected config, render_mode or max_episode_steps") from None
+        except ZeroDivisionError:  # at an intersection, who yields is decided twice a second
+            frequency = (arguments.get("config") or {}).get("simulation_frequency")
+            raise ValueError(f"config simulation_frequency = {frequency}: expected >= 5 where roads cross") from None
 
 
 def check_frequencies(config: dict) -> None:
