@@ -221,7 +221,7 @@ class ShieldedEgo:
         wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
         rules = settings.ego, settings.other, settings.rules, settings.dt
         danger = find_danger(ego, users, *self.last, self.memory, *rules)
-        response = Response(wish, False, False)
+        response = Response(wish, False, False, False)
         if settings.overrides:
             response = respond(wish, danger, ego, Body(*self.body, curvature), settings.rules, settings.dt)
         command = response.command

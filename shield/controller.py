@@ -4,11 +4,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shield.anticipation import acceleration_cap, farthest_bound, lateral_cap
 from shield.chosen import how_many, which
 from shield.command import Command
 from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
-from shield.pair import assess, leading_speed, least_cosine, least_margin, own_share, toward
+from shield.lateral import d_min_no_credit, lateral_euler_margin
+from shield.pair import (
+    assess,
+    is_following,
+    leading_speed,
+    least_cosine,
+    least_margin,
+    own_share,
+    sampling_margin,
+    toward,
+)
+from shield.params import RSSParams
 from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, owes_no_approach, remember
 
 
@@ -16,7 +28,8 @@ class Danger(NamedTuple):
     """What the shield saw on one frame."""
 
     free: Bounds  # what the ego may do while it owes nobody anything
-    bounds: Bounds  # what it may do now
+    bounds: Bounds  # what its duties leave of that
+    eased: Bounds  # and what anticipation leaves
     dangerous: bool
     partner: int  # index of the road user nearest to danger, -1 if alone
     margin_lon: float  # of that pair [m]; inf if alone
@@ -30,6 +43,7 @@ class Response(NamedTuple):
 
     command: Command  # what it lets through
     overridden: bool  # a duty toward somebody changed the command
+    anticipated: bool  # anticipation did, on top or alone
     limited: bool  # only the always-on limits did
 
 
@@ -86,7 +100,8 @@ def find_danger(
       `Danger`.
     """
     free = always_on(ego, ego_params, rules, dt)
-    bounds = free
+    bounds, cap, left, right = free, np.inf, np.inf, np.inf
+    look = look_ahead_of(ego, ego_params, other_params, rules, dt)
     worst, partner, margin_lon, margin_lat, ttc = nearest, -1, np.inf, np.inf, soonest
     dangerous, response = False, 0
     share_ego = own_share(ego.speed, ego.cos, ego_params, dt)
@@ -107,13 +122,27 @@ def find_danger(
             other_params,
             dt,
         )
-        if memory[i].since == 0 and margin > max(worst, SAFE_BEYOND_DOUBT) and not _may_be_next(ego, user, ttc, rules):
+        if (
+            memory[i].since == 0
+            and margin > max(worst, SAFE_BEYOND_DOUBT)
+            and not _may_be_next(ego, user, ttc, rules)
+            and not _may_bind(ego, user, margin, look)
+        ):
             memory[i].skipped = True
             continue
         catch_up(memory[i], ego_before, users_before[i], ego_params, other_params, rules, dt)
         pair = assess(ego, user, ego_params, other_params, rules, dt)
         remember(memory[i], pair, ego, user, dt)
         bounds = merge(bounds, memory[i], ego_params, rules, dt)
+        if memory[i].since == 0 and rules.anticipation > 0.0:
+            if pair.safe_lon and not pair.safe_lat:
+                cap = min(cap, _cap_behind(pair, memory[i], ego_params, other_params, rules, dt))
+            elif pair.safe_lat and not pair.safe_lon:
+                limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, ego_params, rules.anticipation, dt)
+                if pair.side > 0.0:
+                    right = min(right, limit)
+                else:
+                    left = min(left, limit)
         if memory[i].since > 0:
             dangerous = True
             braking = owes_braking(memory[i], rules)
@@ -125,7 +154,15 @@ def find_danger(
             worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat
         if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
             ttc = min(ttc, max(pair.gap_lon, 0.0) / (pair.v_ego - pair.v_other))
-    return Danger(free, bounds, dangerous, partner, margin_lon, margin_lat, response, ttc)
+    eased = Bounds(
+        bounds.a_lower,
+        min(bounds.a_upper, cap),
+        min(bounds.left, left),
+        min(bounds.right, right),
+        min(bounds.left_next, left),
+        min(bounds.right_next, right),
+    )
+    return Danger(free, bounds, eased, dangerous, partner, margin_lon, margin_lat, response, ttc)
 
 
 @compiled
@@ -148,9 +185,72 @@ def respond(nominal, danger, ego, body, rules, dt):
       `Response`.
     """
     limited = restrict(nominal, danger.free, ego, body, rules, dt)
-    command = restrict(nominal, danger.bounds, ego, body, rules, dt) if danger.bounds != danger.free else limited
-    overridden = command != limited
-    return Response(command, overridden, limited != nominal and not overridden)
+    owed = restrict(nominal, danger.bounds, ego, body, rules, dt) if danger.bounds != danger.free else limited
+    command = restrict(nominal, danger.eased, ego, body, rules, dt) if danger.eased != danger.bounds else owed
+    overridden, anticipated = owed != limited, command != owed
+    return Response(command, overridden, anticipated, limited != nominal and not overridden and not anticipated)
+
+
+@inner
+def _cap_behind(pair, memory, ego_params, other_params, rules, dt):
+    """Cap of the acceleration behind a pair's other, inf where it is not ahead the same way [m/s^2]."""
+    if not pair.ego_is_rear or not is_following(pair.v_ego, pair.v_other, pair.opposite):
+        return np.inf
+    return acceleration_cap(
+        pair.gap_lon,
+        pair.margin_lon,
+        pair.v_ego,
+        pair.v_other,
+        memory.acceleration_other,
+        ego_params,
+        other_params,
+        rules.anticipation,
+        dt,
+    )
+
+
+class LookAhead(NamedTuple):
+    """Whom anticipation may be about."""
+
+    speed: float  # of the ego [m/s]
+    rear: RSSParams  # the ego's
+    rate: float  # kappa, 0 = nobody [1/s]
+    lateral: float  # distance across the lane that keeps a car safe which does not move sideways [m]
+
+
+@compiled
+def look_ahead_of(ego, ego_params, other_params, rules, dt):
+    """`LookAhead` of the ego on one frame."""
+    if rules.anticipation == 0.0:
+        return LookAhead(ego.speed, ego_params, 0.0, 0.0)
+    w = max(toward(1.0, ego), toward(-1.0, ego), 0.0)
+    lateral = d_min_no_credit(w, 0.0, ego_params, other_params) + rules.overlap_margin
+    lateral += lateral_euler_margin(w, ego_params, dt) + sampling_margin(0.0, other_params, dt)
+    return LookAhead(ego.speed, ego_params, rules.anticipation, lateral)
+
+
+@compiled
+def may_bind(ahead, margin, gap_lat, u, speed, look):
+    """May anticipation cap the ego's acceleration for somebody? If not, nothing depends on measuring the pair.
+
+    Args:
+      ahead: of the ego.
+      margin: a lower bound of the margin of Def. 1 [m].
+      gap_lat: across the lane, or less [m].
+      u: does the user move sideways?
+      speed: of the user [m/s].
+      look: `LookAhead`.
+    """
+    if look.rate == 0.0 or not ahead or (gap_lat >= look.lateral and not u):
+        return False
+    return margin < farthest_bound(look.speed, speed, look.rear, look.rate)
+
+
+@inner
+def _may_bind(ego, user, margin, look):
+    """`may_bind` of a measured pair."""
+    gap_lat = signed_gap(user.y - ego.y, ego.half_width, user.half_width)
+    return may_bind(user.s >= ego.s, margin, gap_lat, user.u != 0.0 or user.sin != 0.0, user.speed, look)
 
 
 @inner

@@ -195,7 +195,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     if steering != 0.0 and (settings.overrides or danger.dangerous):
         slip = arctan(0.5 * tan(steering))
     wish = Command(acceleration, slip)
-    response = Response(wish, False, False)
+    response = Response(wish, False, False, False)
     if settings.overrides:
         body = Body(car.length / 2, watch.max_slip, curvature)
         response = respond(wish, danger, ego, body, settings.rules, settings.dt)

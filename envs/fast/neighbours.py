@@ -14,7 +14,7 @@ from envs.fast.network import heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
 from envs.highway import road_through
 from shield.compiled import rare
-from shield.controller import SAFE_BEYOND_DOUBT, may_be_next
+from shield.controller import SAFE_BEYOND_DOUBT, look_ahead_of, may_be_next, may_bind
 from shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
 from shield.lane_frame import same_frame, to_lane_frame
 from shield.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
@@ -139,7 +139,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     _note(ego, now[episode.ego])
     curvature = _to_record(road, now[episode.ego], before[episode.ego], boxes[0], dt, me)
     me.wreck, me.in_own_lane = False, True
-    threshold = _look_over(cars, episode, ego, me, road, now, sight.x, settings, soonest)
+    threshold = _look_over(cars, episode, ego, me, road, now, before, boxes, sight.x, settings, soonest)
     if not chosen:
         _choose_near(episode, past, sight.x, max(min(threshold, nearest), SAFE_BEYOND_DOUBT) + _ROUNDING)
     for a in range(episode.near):
@@ -205,7 +205,7 @@ def _to_record(road, pose, before, box, dt, user):
 
 
 @merged
-def _look_over(cars, episode, ego, me, road, now, bounds, settings, soonest):
+def _look_over(cars, episode, ego, me, road, now, before, boxes, bounds, settings, soonest):
     """Note where everybody is, and bound the longitudinal margin of each from below [m].
 
     Where the bound is -inf nothing is known, or the time to collision may be the shortest.
@@ -219,6 +219,7 @@ def _look_over(cars, episode, ego, me, road, now, bounds, settings, soonest):
     lead, least_cos = leading_speed(me, settings.rules), least_cosine(settings.rules)
     half_lengths, half_widths = me.half_length + _HALF_DIAGONAL, me.half_width + _HALF_DIAGONAL
     nearest = np.inf
+    look = look_ahead_of(me, settings.ego, settings.other, settings.rules, settings.dt)
     for i in range(episode.cars - 1):
         k = car_of(i, episode)
         car, pose = cars[k], now[k]
@@ -246,7 +247,12 @@ def _look_over(cars, episode, ego, me, road, now, bounds, settings, soonest):
         gap_lon, gap_lat = along - half_lengths - _ROUNDING, abs(across) - half_widths
         is_next = may_be_next(along >= 0.0, gap_lon, gap_lat, closing, soonest)
         oncoming = car.cos * ego.cos + car.sin * ego.sin <= 0.0
-        bounds[i] = -np.inf if is_next or oncoming else bound
+        was = before[k]
+        drifts = car.sin * cos != car.cos * sin or (car.y - was.y) * cos != (car.x - was.x) * sin
+        own_half = boxes[1 if car.kind == OBSTACLE else 0, 3]  # of one that does not drift
+        gap_lat = abs(across) - me.half_width - own_half - _ROUNDING
+        binds = may_bind(along >= 0.0, bound, gap_lat, drifts, car.speed, look)
+        bounds[i] = -np.inf if is_next or oncoming or binds else bound
         nearest = min(nearest, max(abs(along), abs(across)))
     return nearest
 
