@@ -8,6 +8,7 @@ import pytest
 from envs import make
 from envs.highway import ShieldedEgo
 from shield import PRESETS, d_min_lateral, d_min_opposite_direction, d_min_same_direction
+from shield.risk import RiskSettings, marking, road_users, scene_risk
 
 PAIRS = 10_000
 
@@ -66,6 +67,19 @@ def test_batch_evaluation_of_distances(benchmark, formula):
     benchmark(formula, first, second, ego, other)
     if benchmark.stats:
         print(f"\n{formula.__name__}: {1e9 * benchmark.stats.stats.median / PAIRS:.1f} ns per pair")
+
+
+@pytest.mark.parametrize("lane_change", [False, True], ids=["following", "lane-change"])
+@pytest.mark.parametrize("mode", ["iso", "radial"])
+def test_risk_of_a_scene_of_50_road_users(benchmark, mode, lane_change):
+    rng, settings = np.random.default_rng(0), RiskSettings.validated(mode=mode)
+    x, y, vx = rng.uniform(-70.0, 70.0, 50), rng.uniform(-8.0, 8.0, 50), rng.uniform(15.0, 30.0, 50)
+    users, ego = road_users(x, y, vx, 0.0), road_users(0.0, 0.0, 25.0, 0.0)[0]
+    lines = np.concatenate([marking("striped", 1.5, 0.1, 4.0), marking("edge", 2.5, -0.1, 4.0)])
+    scene_risk(ego, users, lines, lane_change, settings)
+    benchmark(scene_risk, ego, users, lines, lane_change, settings)
+    if benchmark.stats:
+        print(f"\nrisk of 50 road users, {mode}: {1e6 * benchmark.stats.stats.median:.1f} us, called from Python")
 
 
 def test_one_distance_of_ad_rss(benchmark):

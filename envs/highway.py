@@ -1,6 +1,6 @@
 """highway-env objects to shield arrays and back: the only reader of highway-env's internals."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from highway_env.road.lane import CircularLane, SineLane, StraightLane
@@ -199,6 +199,7 @@ class ShieldedEgo:
         self.min_ttc = float("inf")
         self.tally = StepTally()
         self.record: list[Frame] | None = [] if record else None
+        self.meter: Any = None  # `RiskMeter` that looks on after each frame
         vehicle.act = self.act
 
     # -- called by highway-env
@@ -210,6 +211,8 @@ class ShieldedEgo:
             self.nominal = dict(vehicle.action)
         elif not self.check_contact():
             self._frame()
+            if self.meter is not None:
+                self.meter.look(self)
 
     def _frame(self) -> None:
         vehicle, settings = self.vehicle, self.settings

@@ -8,6 +8,7 @@ from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
 from envs.highway import Frame, Settings, ShieldedEgo
+from envs.risk import RiskMeter, check_risk
 from envs.shielding import attach, audit_of, begin_step, end_step, info_of
 from envs.traffic import shield_everybody
 from envs.wrapper import (
@@ -21,6 +22,7 @@ from envs.wrapper import (
 )
 from shield.blame import Audit
 from shield.params import Preset, RSSParams, Rules
+from shield.risk import RiskSettings
 
 
 class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
@@ -37,7 +39,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
       env: a highway-env environment with `MultiAgentAction`, such as intersection-multi-agent-v0/-v1/-v2.
       intervention_penalty: subtracted from each agent's reward, times its own `override_fraction`; from one
         reward for all, times the mean of these fractions.
-      mode, params, rules, record, entry, intent, waiting, traffic, examine: see `ShieldWrapper`.
+      mode, params, rules, record, entry, intent, waiting, traffic, examine, risk: see `ShieldWrapper`.
 
     Raises:
       ValueError: as `ShieldWrapper`.
@@ -56,6 +58,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         waiting: str = "line",
         traffic: str = "stock",
         examine: str = "table",
+        risk: bool | RiskSettings = False,
     ) -> None:
         RecordConstructorArgs.__init__(
             self,
@@ -69,6 +72,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
             waiting=waiting,
             traffic=traffic,
             examine=examine,
+            risk=risk,
         )
         gym.Wrapper.__init__(self, env)
         check_options(mode, intervention_penalty, traffic)
@@ -80,6 +84,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
+        self.risk = check_risk(risk)
         self._attach()
 
     @property
@@ -134,6 +139,8 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         self._settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
         goal, among = env.config.get("destination"), self.traffic == "compliant"
         self._egos = [attach(vehicle, self._settings, self.record, goal, among) for vehicle in env.controlled_vehicles]
+        for ego in self._egos:
+            ego.meter = RiskMeter(self.risk) if self.risk is not None else None
         self._drivers: list[ShieldedEgo] = []
         self._welcome()
 

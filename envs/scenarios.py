@@ -7,6 +7,7 @@ from envs.multi_agent import MultiAgentShield, has_agents
 from envs.stock import make_stock
 from envs.wrapper import ShieldWrapper
 from shield.params import Preset, RSSParams, Rules
+from shield.risk import RiskSettings
 
 
 def make(
@@ -21,6 +22,7 @@ def make(
     waiting: str = "line",
     traffic: str = "stock",
     examine: str = "table",
+    risk: bool | RiskSettings = False,
     **kwargs,
 ) -> gym.Env:
     """`gymnasium.make` with a shield around it: `MultiAgentShield` for several agents, `ShieldWrapper` for one.
@@ -28,7 +30,7 @@ def make(
     Args:
       env_id: "highway-fast-v0", "highway-v0", "two-way-v0", "merge-v0", "signalised-intersection-v0", ...
       shield: "override", "monitor", or None for the bare environment.
-      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine: see `ShieldWrapper`.
+      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine, risk: see `ShieldWrapper`.
       kwargs: passed to `gymnasium.make`, e.g. `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:
@@ -38,6 +40,8 @@ def make(
         raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
     if shield is None and traffic != "stock":
         raise ValueError(f"traffic = {traffic!r}: expected 'stock' without a shield; use shield = 'monitor'")
+    if shield is None and risk:
+        raise ValueError(f"risk = {risk!r}: expected False without a shield; use shield = 'monitor'")
     try:
         env = make_stock(env_id, **kwargs)
     except gym.error.Error as error:
@@ -57,4 +61,5 @@ def make(
         waiting=waiting,
         traffic=traffic,
         examine=examine,
+        risk=risk,
     )

@@ -34,6 +34,8 @@ def attach(
 def begin_step(ego: ShieldedEgo) -> bool:
     """Start counting anew; returns whether the ego has had its contact before this step."""
     ego.tally = StepTally()
+    if ego.meter is not None:
+        ego.meter.begin_step()
     return ego.contact is not None
 
 
@@ -75,6 +77,7 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
         "episode_dangerous_pairs": ego.dangerous_pairs,
         "episode_broken_duties": ego.broken_duties,
         "min_ttc": min(ego.min_ttc, LONGEST_TTC),
+        **(ego.meter.info() if ego.meter is not None else {}),
     }
 
 

@@ -15,6 +15,7 @@ from highway_env.envs.two_way_env import TwoWayEnv
 from highway_env.envs.u_turn_env import UTurnEnv
 
 from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
+from envs.risk import RiskFrame, RiskMeter, check_risk
 from envs.shielding import attach, audit_of, begin_step, end_step, info_of
 from envs.signalised import SignalisedIntersectionEnv
 from envs.traffic import TRAFFIC, shield_everybody
@@ -24,6 +25,7 @@ from shield.junction import ENTRIES
 from shield.kinematics import frames_for
 from shield.params import PRESETS, Preset, RSSParams, Rules
 from shield.plans import INTENTS
+from shield.risk import RiskSettings
 
 MODES = ("override", "monitor")
 WAITING = ("line", "anywhere")
@@ -65,6 +67,12 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
       time: since reset [s].
       is_success: has the ego reached its goal? Only where there is one: past an intersection, on the exit
         (after a step).
+      risk: only with the option `risk`: of the worst frame of this step `rdsi`, its thresholds `lower` and `upper`,
+        `state` ("known_safe", "unknown", "known_unsafe") and `partner`; the `largest` of one source and the largest
+        `total` of all and of lane markings, with `state_of_total`; and toward the leader the smallest `ttc`, `thw` [s]
+        and the largest `drac` [m/s^2]. Since reset: max_rdsi (of one source), max_total_rdsi, time_known_safe,
+        time_unknown, time_known_unsafe [s], band_risk (integral of RDSI over the stays in the unknown [s]), min_thw
+        (at most 100), max_drac. See `shield.risk`.
       traffic_blame: with compliant traffic, the verdicts of all other cars that have had a contact, each from its
         own view.
 
@@ -85,6 +93,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         everybody, for the same commands; "geofence", "walk", "first-conflicting" and "first" may miss
         somebody (`shield.examined`).
       traffic: "stock", or "compliant": every other car has a shield of its own, in every mode.
+      risk: measure the driving safety field around the ego, too: True, or `RiskSettings`.
 
     Raises:
       ValueError: unsupported environment, action type or mode; bad parameters; a response time
@@ -104,6 +113,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         waiting: str = "line",
         traffic: str = "stock",
         examine: str = "table",
+        risk: bool | RiskSettings = False,
     ) -> None:
         RecordConstructorArgs.__init__(
             self,
@@ -117,6 +127,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
             waiting=waiting,
             traffic=traffic,
             examine=examine,
+            risk=risk,
         )
         gym.Wrapper.__init__(self, env)
         check_options(mode, intervention_penalty, traffic)
@@ -128,6 +139,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         self.intervention_penalty = float(intervention_penalty)
         self.record = record
         self.traffic = traffic
+        self.risk = check_risk(risk)
         self._attach()
 
     @property
@@ -140,6 +152,17 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         if self._ego.record is None:
             raise ValueError("record = False: expected True to keep the frames of an episode")
         return self._ego.record
+
+    @property
+    def risk_frames(self) -> list[RiskFrame]:
+        """Risk of every frame of this episode so far.
+
+        Raises:
+          ValueError: the wrapper was made without `risk`.
+        """
+        if self._ego.meter is None:
+            raise ValueError("risk = False: expected True to measure the risk of an episode")
+        return self._ego.meter.frames
 
     def audit(self) -> Audit:
         """For every dangerous pair-frame of this episode so far: did the ego keep its duty? Needs `record=True`.
@@ -184,6 +207,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         settings = settings_for(env, self.params, self.rules, self.mode, self.conduct)
         goal, among = env.config.get("destination"), self.traffic == "compliant"
         self._ego = attach(env.vehicle, settings, self.record, goal, among)
+        self._ego.meter = RiskMeter(self.risk) if self.risk is not None else None
         self._drivers: list[ShieldedEgo] = []
         self._welcome()
 

@@ -9,6 +9,7 @@ from shield.chosen import how_many, which
 from shield.command import Command
 from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
+from shield.kinematics import time_to_collision
 from shield.lateral import d_min_no_credit, lateral_euler_margin
 from shield.pair import (
     assess,
@@ -153,7 +154,7 @@ def find_danger(
         if margin < worst:
             worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat
         if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
-            ttc = min(ttc, max(pair.gap_lon, 0.0) / (pair.v_ego - pair.v_other))
+            ttc = min(ttc, time_to_collision(pair.gap_lon, pair.v_ego - pair.v_other))
     eased = Bounds(
         bounds.a_lower,
         min(bounds.a_upper, cap),

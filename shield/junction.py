@@ -33,6 +33,7 @@ from shield.compiled import apart, compiled, inner
 from shield.conflict_areas import CELL, boxes_overlap, cell_of
 from shield.controller import RESPONSE_BRAKE, RESPONSE_GO
 from shield.examined import TABLE, count_examined, examine, is_left_out
+from shield.kinematics import time_to_collision
 from shield.plans import (
     ANYWHERE,
     EVERYBODY,
@@ -501,7 +502,7 @@ def _ttc(scene):
             s = on_path_of_ego(scene.paths, track.path, track.s, threat, threat.s)
             gap = s - track.s - track.half_length - threat.half_length
             if track.s <= s < np.inf:
-                ttc = min(ttc, max(gap, 0.0) / (track.v - threat.v))
+                ttc = min(ttc, time_to_collision(gap, track.v - threat.v))
     return ttc
 
 

@@ -70,6 +70,12 @@ def travel(tau, v, rho, a, b, v_cap=np.inf):
 
 
 @compiled
+def time_to_collision(gap, closing):
+    """Time until a gap that shrinks at a constant speed is gone [s]: TTC; inf if it does not shrink."""
+    return max(gap, 0.0) / closing if closing > 0.0 else np.inf
+
+
+@compiled
 def time_to_cover_accelerating(distance, v, a, v_cap):
     """Time to cover a distance while accelerating at `a` >= 0 up to `v_cap`, from v >= 0 [s]; inf if it never is."""
     if distance <= 0.0:

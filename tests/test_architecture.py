@@ -37,6 +37,10 @@ def test_a_module_imports_only_what_its_package_may(path):
     assert imported_packages(path) <= MAY_IMPORT[package] | {package}
 
 
+def test_nothing_in_the_shield_depends_on_the_measure_of_risk():
+    assert not [path for path in (ROOT / "shield").glob("*.py") if "shield.risk" in path.read_text(encoding="utf-8")]
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "tests").rglob("*.py")), ids=lambda path: path.name)
 def test_nothing_imports_the_training_script(path):
     assert "train" not in imported_packages(path)
