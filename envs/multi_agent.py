@@ -9,7 +9,7 @@ from highway_env.envs.common.action import MultiAgentAction
 
 from envs.highway import Frame, Settings, ShieldedEgo
 from envs.risk import RiskMeter, check_risk
-from envs.shielding import attach, audit_of, begin_step, end_step, info_of
+from envs.shielding import attach, audit_of, begin_step, charge, end_step, info_of
 from envs.traffic import shield_everybody
 from envs.wrapper import (
     check_action_type,
@@ -37,9 +37,9 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
 
     Args:
       env: a highway-env environment with `MultiAgentAction`, such as intersection-multi-agent-v0/-v1/-v2.
-      intervention_penalty: subtracted from each agent's reward, times its own `override_fraction`; from one
-        reward for all, times the mean of these fractions.
-      mode, params, rules, record, entry, intent, waiting, traffic, examine, risk: see `ShieldWrapper`.
+      intervention_penalty: subtracted from each agent's reward, times what `penalty_on` names of its own; from one
+        reward for all, times the mean of that.
+      mode, penalty_on, params, rules, record, entry, intent, waiting, traffic, examine, risk: see `ShieldWrapper`.
 
     Raises:
       ValueError: as `ShieldWrapper`.
@@ -51,6 +51,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         mode: str = "override",
         params: Preset | tuple[RSSParams, RSSParams] | None = None,
         intervention_penalty: float = 0.0,
+        penalty_on: str = "response",
         rules: Rules = Rules(),
         record: bool = False,
         entry: str = "cautious",
@@ -65,6 +66,7 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
             mode=mode,
             params=params,
             intervention_penalty=intervention_penalty,
+            penalty_on=penalty_on,
             rules=rules,
             record=record,
             entry=entry,
@@ -75,13 +77,13 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
             risk=risk,
         )
         gym.Wrapper.__init__(self, env)
-        check_options(mode, intervention_penalty, traffic)
+        check_options(mode, intervention_penalty, penalty_on, traffic)
         check_agents(env.unwrapped)
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
         self.rules = rules
-        self.intervention_penalty = float(intervention_penalty)
+        self.intervention_penalty, self.penalty_on = float(intervention_penalty), penalty_on
         self.record = record
         self.traffic = traffic
         self.risk = check_risk(risk)
@@ -127,11 +129,11 @@ class MultiAgentShield(gym.Wrapper, RecordConstructorArgs):
         agents = tuple(end_step(*one) for one in zip(self._egos, had_contact, action, strict=True))
         info.update(agents=agents, raw_reward=reward, **traffic_info(self))
         if self.intervention_penalty > 0.0:
-            overridden = [agent["shield"]["override_fraction"] for agent in agents]
+            charges = [charge(agent, self.intervention_penalty, self.penalty_on) for agent in agents]
             if isinstance(reward, tuple):
-                reward = tuple(r - self.intervention_penalty * f for r, f in zip(reward, overridden, strict=True))
+                reward = tuple(r - c for r, c in zip(reward, charges, strict=True))
             else:
-                reward = reward - self.intervention_penalty * np.mean(overridden)
+                reward = reward - np.mean(charges)
         return observation, reward, terminated, truncated, info
 
     def _attach(self) -> None:

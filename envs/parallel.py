@@ -8,6 +8,7 @@ from pettingzoo import ParallelEnv
 
 from envs.multi_agent import MultiAgentShield
 from envs.scenarios import make
+from envs.shielding import charge
 
 
 def parallel_env(env_id: str = "intersection-multi-agent-v0", **options) -> "ShieldedParallelEnv":
@@ -86,12 +87,12 @@ class ShieldedParallelEnv(ParallelEnv):
         everybody = zip(self.possible_agents, self._idle, strict=True)
         joint = tuple(actions.get(agent, idle) for agent, idle in everybody)
         observations, _, _, truncated, info = self.env.step(joint)
-        penalty = self.env.intervention_penalty
         infos = tuple(
             {**one, "raw_reward": float(reward)}
             for one, reward in zip(info["agents"], info["agents_rewards"], strict=True)
         )
-        rewards = tuple(one["raw_reward"] - penalty * one["shield"]["override_fraction"] for one in infos)
+        paid = self.env.intervention_penalty, self.env.penalty_on
+        rewards = tuple(one["raw_reward"] - charge(one, *paid) for one in infos)
         terminations = self._of_agents([bool(ended) for ended in info["agents_terminated"]])
         truncations = dict.fromkeys(self.agents, bool(truncated))
         outcome = self._of_agents(observations), self._of_agents(rewards), terminations, truncations

@@ -16,6 +16,7 @@ def make(
     params: Preset | tuple[RSSParams, RSSParams] | None = None,
     rules: Rules = Rules(),
     intervention_penalty: float = 0.0,
+    penalty_on: str = "response",
     record: bool = False,
     entry: str = "cautious",
     intent: str = "any",
@@ -30,7 +31,8 @@ def make(
     Args:
       env_id: "highway-fast-v0", "highway-v0", "two-way-v0", "merge-v0", "signalised-intersection-v0", ...
       shield: "override", "monitor", or None for the bare environment.
-      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine, risk: see `ShieldWrapper`.
+      params, rules, intervention_penalty, penalty_on, record, entry, intent, waiting, traffic, examine, risk: see
+        `ShieldWrapper`.
       kwargs: passed to `gymnasium.make`, e.g. `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:
@@ -54,6 +56,7 @@ def make(
         mode=shield,
         params=params,
         intervention_penalty=intervention_penalty,
+        penalty_on=penalty_on,
         rules=rules,
         record=record,
         entry=entry,

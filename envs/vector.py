@@ -1,6 +1,5 @@
 """Many environments at once, on either simulator."""
 
-import math
 from functools import partial
 from typing import Any
 
@@ -13,7 +12,7 @@ from envs.fast.config import Unsupported, compile_scenario
 from envs.fast.vector import FastVectorEnv
 from envs.highway import PLANS
 from envs.scenarios import make
-from envs.wrapper import MODES, check_conduct, check_environment, check_params, settings_for
+from envs.wrapper import MODES, check_conduct, check_environment, check_params, check_penalty, settings_for
 from shield.params import Preset, RSSParams, Rules
 
 BACKENDS = ("fast", "highway-env")
@@ -27,6 +26,7 @@ def make_vec(
     params: Preset | tuple[RSSParams, RSSParams] | None = None,
     rules: Rules = Rules(),
     intervention_penalty: float = 0.0,
+    penalty_on: str = "response",
     config: dict | None = None,
     threads: int = 1,
     autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
@@ -44,7 +44,7 @@ def make_vec(
       num_envs: how many.
       shield: "override", "monitor", or None for bare environments.
       backend: "fast", the compiled engine, or "highway-env", the original one after the other.
-      params, rules, intervention_penalty, entry, intent, waiting, examine: see `ShieldWrapper`.
+      params, rules, intervention_penalty, penalty_on, entry, intent, waiting, examine: see `ShieldWrapper`.
       config: as for `gymnasium.make` of a highway-env environment.
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`.
@@ -59,11 +59,14 @@ def make_vec(
     for name, value in (("num_envs", num_envs), ("threads", threads)):
         if not (isinstance(value, int) and value >= 1):
             raise ValueError(f"{name} = {value!r}: expected a whole number >= 1")
-    if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
-        raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
+    check_penalty(intervention_penalty, penalty_on)
     if backend == "highway-env":
         options: dict[str, Any] = dict(
-            params=params, rules=rules, intervention_penalty=intervention_penalty, config=config
+            params=params,
+            rules=rules,
+            intervention_penalty=intervention_penalty,
+            penalty_on=penalty_on,
+            config=config,
         )
         options |= dict(entry=entry, intent=intent, waiting=waiting, examine=examine)
         one = partial(_make_counted, env_id, shield, options)
@@ -78,7 +81,8 @@ def make_vec(
         if settings.scheme == PLANS and not isinstance(stock.action_type, DiscreteMetaAction):
             kind = type(stock.action_type).__name__
             raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
-    return FastVectorEnv(scenario, num_envs, settings, intervention_penalty, autoreset_mode, threads)
+    by_change = penalty_on == "change"
+    return FastVectorEnv(scenario, num_envs, settings, intervention_penalty, autoreset_mode, threads, by_change)
 
 
 def _make_counted(env_id: str, shield: str | None, options: dict) -> gym.Env:

@@ -16,7 +16,7 @@ from highway_env.envs.u_turn_env import UTurnEnv
 
 from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
 from envs.risk import RiskFrame, RiskMeter, check_risk
-from envs.shielding import attach, audit_of, begin_step, end_step, info_of
+from envs.shielding import PENALTIES, attach, audit_of, begin_step, charge, end_step, info_of
 from envs.signalised import SignalisedIntersectionEnv
 from envs.traffic import TRAFFIC, shield_everybody
 from shield.blame import Audit
@@ -50,9 +50,10 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
     Every info has
 
       shield: dict of this step: `intervened`, `override_fraction` (share of the frames in which a
-        duty toward somebody changed the command), `limited_fraction` (frames in which only the
-        always-on limits did), `proposed_action` (after a step), `acceleration_change` [m/s^2] and
-        `steering_change` [rad] (largest), `dangerous`, `dangerous_pairs` and `broken_duties`
+        duty toward somebody changed the command: the proper response), `anticipation_fraction` (in which no duty did,
+        but anticipation), `limited_fraction` (in which only the always-on limits did), `proposed_action` (after a
+        step), `acceleration_change` [m/s^2] and `steering_change` [rad] (largest), `mean_acceleration_change` and
+        `mean_steering_change` (over the frames), `lane_change_refused`, `dangerous`, `dangerous_pairs`, `broken_duties`
         (pair-frames), and for the pair nearest to danger `partner` (index in `road.vehicles`,
         static objects after them, -1 = nobody), `min_margin_lon`, `min_margin_lat` (gap minus
         required gap [m], inf = nobody); `response`: "none", "longitudinal", "lateral", "both", or "go": on
@@ -61,7 +62,11 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
       blame: "" before a contact, then "ego", "other", "both", "inherited", or "none" (a bug).
       blame_evidence: {} or partner, kind of danger, seconds since its threshold, duties broken and
         by how much.
-      override_share, episode_cost, episode_dangerous_pairs, episode_broken_duties, min_ttc: since
+      override_share, anticipation_share, limited_share, mean_acceleration_change [m/s^2], mean_steering_change [rad]:
+        the same since reset.
+      rms_acceleration, rms_jerk, ..., hard_brakings_per_km, min_time_gap: how the ride felt since reset, see
+        `shield.comfort.Comfort`. Time gaps are measured where distances along lanes keep the ego safe.
+      episode_cost, episode_dangerous_pairs, episode_broken_duties, min_ttc: since
         reset; min_ttc [s] is at most 100.
       raw_reward: the environment's own reward (after a step).
       time: since reset [s].
@@ -81,7 +86,9 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
       mode: "override" or "monitor".
       params: `Preset`, a pair of `RSSParams` (ego, other), or None: "intersection" at intersections,
         "simulator" elsewhere.
-      intervention_penalty: subtracted from the reward, times the step's `override_fraction`.
+      intervention_penalty: subtracted from the reward, times what `penalty_on` names.
+      penalty_on: "response", the step's `override_fraction` (the penalty is per decision that is overridden on all
+        frames), or "change", its `mean_acceleration_change` (the penalty is per m/s^2).
       rules: which duties and margins are in force, for ablations.
       record: keep every frame of the episode in `frames`, for `audit`.
       entry: whom the ego expects to give way at a junction: "cautious" nobody, "priority" who must
@@ -106,6 +113,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         mode: str = "override",
         params: Preset | tuple[RSSParams, RSSParams] | None = None,
         intervention_penalty: float = 0.0,
+        penalty_on: str = "response",
         rules: Rules = Rules(),
         record: bool = False,
         entry: str = "cautious",
@@ -120,6 +128,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
             mode=mode,
             params=params,
             intervention_penalty=intervention_penalty,
+            penalty_on=penalty_on,
             rules=rules,
             record=record,
             entry=entry,
@@ -130,13 +139,13 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
             risk=risk,
         )
         gym.Wrapper.__init__(self, env)
-        check_options(mode, intervention_penalty, traffic)
+        check_options(mode, intervention_penalty, penalty_on, traffic)
         check_environment(env.unwrapped)
         self.mode = mode
         self.params = check_params(params, env.unwrapped)
         self.conduct = check_conduct(entry, intent, waiting, examine)
         self.rules = rules
-        self.intervention_penalty = float(intervention_penalty)
+        self.intervention_penalty, self.penalty_on = float(intervention_penalty), penalty_on
         self.record = record
         self.traffic = traffic
         self.risk = check_risk(risk)
@@ -199,7 +208,7 @@ class ShieldWrapper(gym.Wrapper, RecordConstructorArgs):
         info.update(time=float(env.time), raw_reward=reward)
         if isinstance(env, IntersectionEnv):
             info["is_success"] = bool(env.has_arrived(env.vehicle))
-        reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
+        reward = reward - charge(info, self.intervention_penalty, self.penalty_on)
         return observation, reward, terminated, truncated, info
 
     def _attach(self) -> None:
@@ -226,13 +235,19 @@ def traffic_info(wrapper) -> dict[str, Any]:
     return {"traffic_blame": tuple(contact["verdict"] for contact in contacts)}
 
 
-def check_options(mode: str, intervention_penalty: float, traffic: str) -> None:
+def check_options(mode: str, intervention_penalty: float, penalty_on: str, traffic: str) -> None:
     if mode not in MODES:
         raise ValueError(f"mode = {mode!r}: expected one of {', '.join(MODES)}")
-    if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
-        raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
+    check_penalty(intervention_penalty, penalty_on)
     if traffic not in TRAFFIC:
         raise ValueError(f"traffic = {traffic!r}: expected one of {', '.join(TRAFFIC)}")
+
+
+def check_penalty(intervention_penalty: float, penalty_on: str) -> None:
+    if not (isinstance(intervention_penalty, (int, float)) and 0.0 <= intervention_penalty < math.inf):
+        raise ValueError(f"intervention_penalty = {intervention_penalty!r}: expected a finite number >= 0")
+    if penalty_on not in PENALTIES:
+        raise ValueError(f"penalty_on = {penalty_on!r}: expected one of {', '.join(PENALTIES)}")
 
 
 def check_environment(env: Any) -> None:
@@ -331,6 +346,8 @@ def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dic
         )
     ego = params.ego._replace(response_time=float(frames_for(max(rho, dt), dt) * dt))
     other = params.other._replace(response_time=float(frames_for(params.other.response_time, dt) * dt))
+    if not 0.0 <= rules.anticipation < math.inf:
+        raise ValueError(f"anticipation = {rules.anticipation!r} of the rules: expected a finite rate >= 0 [1/s]")
     scheme = scheme_of(env)
     if scheme == PLANS:  # the paths hold everybody's width at any speed, so lateral speeds need no limit
         rules = rules._replace(limits=False)

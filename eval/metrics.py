@@ -38,6 +38,12 @@ METRICS = (
     Metric("speed", "speed", "m/s", "mean", 1, 1),
     Metric("length", "length", "steps", "mean", 1, 1),
     Metric("override_share", "overridden", "%", "mean", 100, 0),
+    Metric("anticipation_share", "anticipated", "%", "mean", 100, 0),
+    Metric("mean_acceleration_change", "change", "m/s²", "mean", 1, 1),
+    Metric("rms_jerk", "rms jerk", "m/s³", "mean", 1, 1),
+    Metric("hard_braking_share", "hard braking", "%", "mean", 100, 0),
+    Metric("comfortable_share", "comfortable", "%", "mean", 100, 0),
+    Metric("min_time_gap", "min time gap", "s", "median", 1, 1),
     Metric("min_ttc", "min TTC", "s", "median", 1, 1),
 )
 

@@ -13,7 +13,7 @@ the other does worse than that, danger begins, and the proper response answers a
 import numpy as np
 
 from shield.compiled import compiled, inner, rare
-from shield.kinematics import stopping_distance
+from shield.kinematics import reach, stopping_distance
 from shield.longitudinal import d_min_following
 
 ROOM = 0.1  # eps: margin that is left alone [m]
@@ -46,22 +46,35 @@ def acceleration_cap(gap, margin, v, v_front, a_front, rear, front, rate, dt):
       dt: length of a frame [s].
 
     Returns:
-      Never less than -a_min_brake: that suffices, or the pair is in danger.
+      Never less than -a_min_brake: that suffices, or the pair is in danger. inf where full throttle is left.
     """
     v_next = max(v_front + max(min(a_front, 0.0), -front.a_max_brake) * dt, 0.0)
-    kept = share_kept(margin, rate, dt)
+    kept = share_kept(margin - speed_cap_credit(v, rear), rate, dt)
     room = gap + (v_front - v) * dt - kept - rear.standstill_gap - rear.a_min_brake * dt**2 / 8
     if room < 0.0:
         return -rear.a_min_brake
     speed = _fastest(room + stopping_distance(v_next, front.a_max_brake), v_next, rear, dt)
     if rear.a_min_brake > front.a_max_brake:
         speed = _checked(speed, room, v_next, rear, front, dt)
-    return max((speed - v) / dt, -rear.a_min_brake)
+    cap = max((speed - v) / dt, -rear.a_min_brake)
+    return cap if cap < rear.a_max_accel else np.inf
+
+
+@compiled
+def speed_cap_credit(v, rear):
+    """What Def. 1 grants a follower that would else get faster than `v_cap` in its response time [m].
+
+    Anticipation takes none of it: near the highest speed, braking would not make the distance shrink fast enough.
+    """
+    rho, a, b = rear.response_time, rear.a_max_accel, rear.a_min_brake
+    if v + a * rho <= rear.v_cap:
+        return 0.0
+    return reach(v, rho, a, b, np.inf) - reach(v, rho, a, b, rear.v_cap)
 
 
 @inner
 def _fastest(d, v_front, rear, dt):
-    """Largest speed v with reach(v) + max(v - v_front, 0) dt/2 <= d [m/s]; the speed cap would only allow more."""
+    """Largest speed v with reach(v) + max(v - v_front, 0) dt/2 <= d, without `v_cap` [m/s]."""
     rho, a, b = rear.response_time, rear.a_max_accel, rear.a_min_brake
     d += 0.5 * a * rho**2
     slower = _root(b, rho, d) - a * rho
@@ -78,7 +91,7 @@ def _root(b, r, d):
 
 @rare
 def _checked(speed, room, v_front, rear, front, dt):
-    """A follower that brakes harder than its leader may be closest before both stand (hole H1): search below `speed`."""
+    """A follower that brakes harder than its leader may be closest before both stand (hole H1): search."""
     low, high = 0.0, max(speed, 0.0)
     for _ in range(30):
         middle = 0.5 * (low + high)
@@ -118,11 +131,18 @@ def lateral_cap(margin, w, w_other, car, rate, dt):
 
 
 @compiled
-def farthest_bound(v, v_front, rear, rate):
-    """Margin of Def. 1 beyond which `acceleration_cap` cannot bind, for a leader no faster than `v_front` [m].
+def farthest_bound(v, rear, front, rate, dt):
+    """Margin of Def. 1 beyond which `acceleration_cap` leaves full throttle, and how much more per speed of the leader.
 
     In a second the margin falls by no more than the ego's speed, what it requires more as it speeds up, and what the
     leader's braking takes off its way to rest, which is its speed.
+
+    Returns:
+      ([m], [s]); (inf, 0) for a follower that brakes harder than its leader (hole H1).
     """
+    if rear.a_min_brake > front.a_max_brake:
+        return np.inf, 0.0
     rho, a, b = rear.response_time, rear.a_max_accel, rear.a_min_brake
-    return (v + (rho + (v + 2.0 * a * rho) / b + 1.0) * a + v_front) / rate + ROOM
+    fall = v + a * (rho + (v + 2.0 * a * rho) / b + 1.0)
+    horizon = max(1.0 / rate, dt)
+    return fall * horizon + ROOM + speed_cap_credit(v, rear), horizon

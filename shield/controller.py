@@ -10,6 +10,7 @@ from shield.command import Command
 from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
 from shield.kinematics import time_to_collision
+from shield.lane_changes import room_beside
 from shield.lateral import d_min_no_credit, lateral_euler_margin
 from shield.pair import (
     assess,
@@ -21,7 +22,6 @@ from shield.pair import (
     sampling_margin,
     toward,
 )
-from shield.params import RSSParams
 from shield.response import Bounds, catch_up, merge, owes_braking, owes_lateral_stop, owes_no_approach, remember
 
 
@@ -31,6 +31,8 @@ class Danger(NamedTuple):
     free: Bounds  # what the ego may do while it owes nobody anything
     bounds: Bounds  # what its duties leave of that
     eased: Bounds  # and what anticipation leaves
+    room_left: float  # how far it may go to either side beside who is alongside [m]; inf if nobody is
+    room_right: float
     dangerous: bool
     partner: int  # index of the road user nearest to danger, -1 if alone
     margin_lon: float  # of that pair [m]; inf if alone
@@ -44,7 +46,7 @@ class Response(NamedTuple):
 
     command: Command  # what it lets through
     overridden: bool  # a duty toward somebody changed the command
-    anticipated: bool  # anticipation did, on top or alone
+    anticipated: bool  # no duty did, but anticipation
     limited: bool  # only the always-on limits did
 
 
@@ -102,6 +104,7 @@ def find_danger(
     """
     free = always_on(ego, ego_params, rules, dt)
     bounds, cap, left, right = free, np.inf, np.inf, np.inf
+    room_left = room_right = np.inf
     look = look_ahead_of(ego, ego_params, other_params, rules, dt)
     worst, partner, margin_lon, margin_lat, ttc = nearest, -1, np.inf, np.inf, soonest
     dangerous, response = False, 0
@@ -144,6 +147,12 @@ def find_danger(
                     right = min(right, limit)
                 else:
                     left = min(left, limit)
+        if rules.take_back and not pair.safe_lon and pair.gap_lat > -min(ego.half_width, user.half_width):
+            room = room_beside(pair.margin_lat, pair.w_ego, ego_params, dt)
+            if pair.side > 0.0:
+                room_right = min(room_right, room)
+            else:
+                room_left = min(room_left, room)
         if memory[i].since > 0:
             dangerous = True
             braking = owes_braking(memory[i], rules)
@@ -163,7 +172,8 @@ def find_danger(
         min(bounds.left_next, left),
         min(bounds.right_next, right),
     )
-    return Danger(free, bounds, eased, dangerous, partner, margin_lon, margin_lat, response, ttc)
+    rooms = room_left, room_right
+    return Danger(free, bounds, eased, *rooms, dangerous, partner, margin_lon, margin_lat, response, ttc)
 
 
 @compiled
@@ -188,7 +198,8 @@ def respond(nominal, danger, ego, body, rules, dt):
     limited = restrict(nominal, danger.free, ego, body, rules, dt)
     owed = restrict(nominal, danger.bounds, ego, body, rules, dt) if danger.bounds != danger.free else limited
     command = restrict(nominal, danger.eased, ego, body, rules, dt) if danger.eased != danger.bounds else owed
-    overridden, anticipated = owed != limited, command != owed
+    overridden = owed != limited
+    anticipated = command != owed and not overridden
     return Response(command, overridden, anticipated, limited != nominal and not overridden and not anticipated)
 
 
@@ -213,9 +224,8 @@ def _cap_behind(pair, memory, ego_params, other_params, rules, dt):
 class LookAhead(NamedTuple):
     """Whom anticipation may be about."""
 
-    speed: float  # of the ego [m/s]
-    rear: RSSParams  # the ego's
-    rate: float  # kappa, 0 = nobody [1/s]
+    within: float  # margin below which it may bind behind a leader that stands, -inf = never [m]
+    horizon: float  # how much farther per speed of the leader [s]
     lateral: float  # distance across the lane that keeps a car safe which does not move sideways [m]
 
 
@@ -223,28 +233,29 @@ class LookAhead(NamedTuple):
 def look_ahead_of(ego, ego_params, other_params, rules, dt):
     """`LookAhead` of the ego on one frame."""
     if rules.anticipation == 0.0:
-        return LookAhead(ego.speed, ego_params, 0.0, 0.0)
+        return LookAhead(-np.inf, 0.0, 0.0)
     w = max(toward(1.0, ego), toward(-1.0, ego), 0.0)
     lateral = d_min_no_credit(w, 0.0, ego_params, other_params) + rules.overlap_margin
     lateral += lateral_euler_margin(w, ego_params, dt) + sampling_margin(0.0, other_params, dt)
-    return LookAhead(ego.speed, ego_params, rules.anticipation, lateral)
+    within, horizon = farthest_bound(max(ego.speed, 0.0), ego_params, other_params, rules.anticipation, dt)
+    return LookAhead(within, horizon, lateral)
 
 
 @compiled
-def may_bind(ahead, margin, gap_lat, u, speed, look):
+def may_bind(ahead, margin, gap_lat, drifts, speed, look):
     """May anticipation cap the ego's acceleration for somebody? If not, nothing depends on measuring the pair.
 
     Args:
       ahead: of the ego.
       margin: a lower bound of the margin of Def. 1 [m].
       gap_lat: across the lane, or less [m].
-      u: does the user move sideways?
+      drifts: does the user move sideways?
       speed: of the user [m/s].
       look: `LookAhead`.
     """
-    if look.rate == 0.0 or not ahead or (gap_lat >= look.lateral and not u):
+    if not ahead or (gap_lat >= look.lateral and not drifts):
         return False
-    return margin < farthest_bound(look.speed, speed, look.rear, look.rate)
+    return margin < look.within + look.horizon * max(speed, 0.0)
 
 
 @inner
