@@ -23,7 +23,7 @@ from shield.controller import (
 from shield.examined import TABLE
 from shield.geometry import ARC_START, LENGTH, PIECE_FIELDS, largest_half_extents, make_road, wrap_angle
 from shield.junction import CAUTIOUS
-from shield.lane_changes import OFF_CENTRE, is_blocked, lead_back
+from shield.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from shield.lane_frame import same_frame, to_lane_frame_all
 from shield.pair import ROAD_USER
 from shield.params import RSSParams, Rules
@@ -305,20 +305,25 @@ class ShieldedEgo:
         return self.settings.overrides and self.settings.rules.take_back and self.settings.scheme == LANES
 
     def _refuse_lane_change(self, before) -> None:
-        """Take back a lane change that the agent has just asked for, if somebody was alongside on the last frame."""
+        """Ignore the lane change that the agent asks for, if it is blocked or comes half-way through another."""
         vehicle = self.vehicle
         if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.contact is not None:
             return
         target = vehicle.target_lane_index
-        if target != before and target[:2] == before[:2] and self._is_blocked(target):
+        if target == before or target[:2] != before[:2]:
+            return
+        back = turns_back(self._offset(vehicle.lane_index), self._offset(before), target[2] - before[2])
+        if back or self._is_blocked(target):
             vehicle.target_lane_index = before
             self.tally.lane_change_refused = True
 
     def _is_blocked(self, index) -> bool:
         """Is the way to the centre of a lane blocked?"""
-        vehicle = self.vehicle
-        lateral = vehicle.road.network.get_lane(index).local_coordinates(vehicle.position)[1]
-        return bool(is_blocked(lateral, *self.rooms))
+        return bool(is_blocked(self._offset(index), *self.rooms))
+
+    def _offset(self, index) -> float:
+        """Offset from the centre of a lane, positive to the right [m]."""
+        return float(self.vehicle.road.network.get_lane(index).local_coordinates(self.vehicle.position)[1])
 
     def _taken_back(self, wish: Command, ego, body: Body) -> Command:
         """What the agent wants, unless it is stuck between two lanes; and the lane that it heads for from now on."""
@@ -339,18 +344,20 @@ class ShieldedEgo:
         return wish
 
     def _reachable(self, here, target):
-        """Lane that the ego can get to: its target, the one it is on, or the one that it has come from."""
-        if target[:2] != here[:2] or not self._is_blocked(target):
+        """Lane that the ego can get to: its target, one on the way, the one it is on, or the one that it has come from."""
+        if target[:2] != here[:2]:
             return target
-        if target != here:
+        for i in range(target[2], here[2], 1 if here[2] > target[2] else -1):
+            if not self._is_blocked((*here[:2], i)):
+                return (*here[:2], i)
+        if target != here or not self._is_blocked(here):
             return here
-        network = self.vehicle.road.network
-        lateral = network.get_lane(here).local_coordinates(self.vehicle.position)[1]
-        if abs(lateral) <= OFF_CENTRE:
+        offset = self._offset(here)
+        if abs(offset) <= OFF_CENTRE:
             return target
         start, end, i = here
-        i += 1 if lateral > 0.0 else -1
-        if not 0 <= i < len(network.graph[start][end]) or self._is_blocked((start, end, i)):
+        i += 1 if offset > 0.0 else -1
+        if not 0 <= i < len(self.vehicle.road.network.graph[start][end]) or self._is_blocked((start, end, i)):
             return target
         return start, end, i
 

@@ -1,4 +1,7 @@
-"""A lane change that is blocked is taken back: nobody stays between two lanes because somebody is alongside."""
+"""A lane change that is blocked is taken back, and one half done is completed: nobody stays between two lanes.
+
+Lateral speeds grow slowly (C1y), so an agent that changes its mind on every decision would never get off the line.
+"""
 
 import numpy as np
 
@@ -34,6 +37,18 @@ def is_blocked(offset, room_left, room_right):
       room_left, room_right: see `room_beside`; inf where nobody is.
     """
     return (room_left if offset > 0.0 else room_right) < abs(offset) - _BLOCKED_BY
+
+
+@compiled
+def turns_back(offset, offset_before, step):
+    """Does an agent between two lanes ask for the opposite of the lane change that is under way?
+
+    Args:
+      offset: of the ego from the centre of the lane it is on, positive to the right [m].
+      offset_before: from that of the lane it heads for [m].
+      step: to the lane that is asked for from that one, positive to the right.
+    """
+    return abs(offset) > OFF_CENTRE and step * offset_before > 0.0
 
 
 @compiled

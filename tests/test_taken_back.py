@@ -81,6 +81,19 @@ def test_who_steers_freely_between_two_lanes_is_led_back(side):
     assert off[0] < 1.2 < off[1]
 
 
+@pytest.mark.parametrize("first", [LEFT, RIGHT])
+def test_a_change_half_done_is_completed(first):
+    env, ego = beside()
+    env.unwrapped.road.vehicles[1].position = np.array([20.0, 4.0])  # out of the way
+    refused, off = [], []
+    for action in (first, IDLE, LEFT + RIGHT - first, IDLE, IDLE):
+        *_, info = env.step(action)
+        refused.append(info["shield"]["lane_change_refused"])
+        off.append(abs(ego.position[1] - 4.0))
+    assert 1.0 < off[1] < 3.0 and refused == [False, False, True, False, False]
+    assert off[-1] > 3.5
+
+
 def test_room_beside_by_hand():
     car = PRESETS["slides"].ego._replace(response_time=1.0, a_lat_max_accel=1.0, a_lat_min_brake=2.0)
     # 0.5 m/s: 0.5 * (1 + 0.1) + 1.5^2 / 4 - 1^2 / 4 m were set aside for it

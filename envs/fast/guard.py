@@ -25,7 +25,7 @@ from shield.compiled import rare
 from shield.controller import Body, Response, find_danger, respond
 from shield.geometry import largest_half_extents
 from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame
-from shield.lane_changes import OFF_CENTRE, is_blocked, lead_back
+from shield.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from shield.plans import Scene
 from shield.response import MEMORY, catch_up
 
@@ -312,7 +312,7 @@ def report_comfort(ride, step):
 
 @merged
 def refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, settings, step):
-    """Take back a lane change of this decision that leaves no plan, or meets somebody who was alongside.
+    """Ignore a lane change of this decision that leaves no plan, is blocked, or comes half-way through another.
 
     `before` is the lane the ego headed for.
     """
@@ -329,7 +329,10 @@ def _refuse_blocked(before, cars, episode, lanes, sight, settings, step):
     if not settings.overrides or not settings.rules.take_back or episode.blame != 0 or ego.kind != META:
         return
     k = ego.target_lane
-    if k != before and lanes[k].road == lanes[before].road and _is_blocked(k, episode, sight):
+    if k == before or lanes[k].road != lanes[before].road:
+        return
+    offsets = sight.lateral[ego.lane, episode.ego], sight.lateral[before, episode.ego]
+    if turns_back(*offsets, k - before) or _is_blocked(k, episode, sight):
         ego.target_lane = before
         step.lane_change_refused = True
 
@@ -358,10 +361,13 @@ def _take_back(wish, car, ego, episode, lanes, sight, body, settings, step):
 
 @compiled
 def _reachable(here, target, episode, lanes, sight):
-    """Lane that the ego can get to: its target, the one it is on, or the one that it has come from."""
-    if lanes[target].road != lanes[here].road or not _is_blocked(target, episode, sight):
+    """Lane that the ego can get to: its target, one on the way, the one it is on, or the one that it has come from."""
+    if lanes[target].road != lanes[here].road:
         return target
-    if target != here:
+    for k in range(target, here, 1 if here > target else -1):
+        if not _is_blocked(k, episode, sight):
+            return k
+    if target != here or not _is_blocked(here, episode, sight):
         return here
     lateral = sight.lateral[here, episode.ego]
     if abs(lateral) <= OFF_CENTRE:
