@@ -344,7 +344,7 @@ class ShieldedEgo:
         return wish
 
     def _reachable(self, here, target):
-        """Lane that the ego can get to: its target, one on the way, the one it is on, or the one that it has come from."""
+        """Lane that the ego can get to: its target, one on the way, the one it is on, or the one it has come from."""
         if target[:2] != here[:2]:
             return target
         for i in range(target[2], here[2], 1 if here[2] > target[2] else -1):

@@ -361,7 +361,7 @@ def _take_back(wish, car, ego, episode, lanes, sight, body, settings, step):
 
 @compiled
 def _reachable(here, target, episode, lanes, sight):
-    """Lane that the ego can get to: its target, one on the way, the one it is on, or the one that it has come from."""
+    """Lane that the ego can get to: its target, one on the way, the one it is on, or the one it has come from."""
     if lanes[target].road != lanes[here].road:
         return target
     for k in range(target, here, 1 if here > target else -1):
