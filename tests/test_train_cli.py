@@ -57,6 +57,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--workers 0", "--workers 0 is out of range: expected 1 to 256"),
         ("--device abacus", "--device abacus is out of range: expected one of auto, cpu"),
         ("--name ../home", "--name ../home is out of range: expected letters, digits and"),
+        ("--penalty-on frames", "--penalty-on frames is out of range: expected one of response, change"),
         ("--intervention-penalty nan", "--intervention-penalty nan is out of range: expected a number >= 0"),
         ("--resume --overwrite", "expected --resume or --overwrite, not both"),
         ("--env-id no-such-road", "'no-such-road'"),
