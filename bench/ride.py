@@ -9,6 +9,7 @@ highway-env's own driver in place of the ego. All play the same seeds.
 """
 
 import dataclasses
+import functools
 import sys
 import time
 from pathlib import Path
@@ -76,7 +77,6 @@ class IdmEgo(gym.Wrapper):
         stock = env.vehicle
         driver = IDMVehicle.create_from(stock)
         driver.route, driver.target_speed = stock.route, 30.0
-        driver.target_speeds, driver.speed_index = stock.target_speeds, stock.speed_index  # which observations show
         env.road.vehicles[env.road.vehicles.index(stock)] = driver
         env.controlled_vehicles = [driver]
         env.action_type.controlled_vehicle = driver
@@ -122,7 +122,8 @@ def play_idm(env_id: str, episodes: int) -> pd.DataFrame:
     seeds = range(FIRST_SEED, FIRST_SEED + episodes)
 
     def watched() -> gym.Env:
-        return ShieldWrapper(IdmEgo(make_stock(env_id)), mode="monitor")
+        seen = {"observation": {"type": "Kinematics"}}  # others may ask for what only MDPVehicle has
+        return ShieldWrapper(IdmEgo(make_stock(env_id, config=seen)), mode="monitor")
 
     return pd.DataFrame([run_episode(watched, lambda _: IDLE, seed) for seed in seeds])
 
@@ -381,16 +382,18 @@ def main(config: Config) -> int:
     if unknown:
         print(f"envs = {unknown[0]!r}: expected some of {', '.join(ROADS)}", file=sys.stderr)
         return 2
-    parts = [HEADER]
-    for env_id in config.envs:
-        parts.append(of_road(env_id, config))
-        print(parts[-1], flush=True)
-    for part in (between_lanes(config), price()):
-        parts.append(part)
-        print(part, flush=True)
     if config.write:
         plot(PLOT)
-        write_text(PAGE, "\n".join(parts))
+    parts = [HEADER]
+    for part in (
+        lambda: between_lanes(config),
+        price,
+        *(functools.partial(of_road, env, config) for env in config.envs),
+    ):
+        parts.append(part())
+        print(parts[-1], flush=True)
+        if config.write:
+            write_text(PAGE, "\n".join(parts))
     return 0
 
 
