@@ -77,6 +77,7 @@ class IdmEgo(gym.Wrapper):
         stock = env.vehicle
         driver = IDMVehicle.create_from(stock)
         driver.route, driver.target_speed = stock.route, 30.0
+        driver.target_speeds, driver.speed_index = stock.target_speeds, stock.speed_index  # some rewards ask for them
         env.road.vehicles[env.road.vehicles.index(stock)] = driver
         env.controlled_vehicles = [driver]
         env.action_type.controlled_vehicle = driver
