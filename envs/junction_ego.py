@@ -120,6 +120,7 @@ class JunctionEgo(ShieldedEgo):
             not settings.waits_anywhere,
             settings.examine,
             settings.overrides,
+            settings.rules,
             holds,
         )
         return report, steering

@@ -33,6 +33,7 @@ from shield.blame import (
 from shield.compiled import apart, compiled, inner
 from shield.conflict_areas import CELL, boxes_overlap, cell_of
 from shield.controller import RESPONSE_BRAKE, RESPONSE_GO
+from shield.easing import cap_before_line, cap_behind_others
 from shield.examined import TABLE, count_examined, examine, is_left_out
 from shield.kinematics import time_to_collision
 from shield.plans import (
@@ -112,7 +113,13 @@ SAMPLE = np.dtype(
 )
 
 # The plan in force.
-PLAN = np.dtype([("go", "i8")], align=True)  # frames of throttle left, -1 = no plan
+PLAN = np.dtype(
+    [
+        ("go", "i8"),  # frames of throttle left, -1 = no plan
+        ("acceleration_before", "f8"),  # on the last frame [m/s^2]
+    ],
+    align=True,
+)
 
 
 class JunctionReport(NamedTuple):
@@ -120,6 +127,7 @@ class JunctionReport(NamedTuple):
 
     acceleration: float  # what it lets through [m/s^2]
     overridden: bool  # somebody's presence changed it
+    anticipated: bool  # anticipation did, while a plan remained
     limited: bool  # only the limits of acceleration did
     response: int  # RESPONSE_BRAKE or RESPONSE_GO where it was overridden, else 0
     pairs: int  # road users toward whom the ego is not free
@@ -131,7 +139,7 @@ class JunctionReport(NamedTuple):
 
 
 @apart
-def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides, holds=False):
+def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides, rules, holds=False):
     """Restrict the ego's acceleration to what leaves it a plan, and judge everybody.
 
     Args:
@@ -144,6 +152,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
       at_line: the ego may rest only where it is in nobody's way, whoever may come.
       which: against whom plans are checked, index into `shield.examined.EXAMINED`.
       overrides: False = watch only.
+      rules: `Rules`, of which anticipation matters here.
       holds: the plan in force is carried out, whatever the controller asks for.
 
     Returns:
@@ -152,24 +161,31 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
     sort_out(scene, memory, entry)
     examine(scene, samples, which, SLACK + scene.drift)
     limited = limit(nominal, scene.track.v, scene.ego, scene.dt)
-    a, clear, trapped = nominal, False, False
+    a, clear, trapped, eased = nominal, False, False, False
     if overrides:
-        a, clear, trapped = _choose(scene, plan, limited, at_line, holds)
+        if rules.anticipation > 0.0 and not holds:
+            a, eased = _ease(scene, plan, memory, limited, at_line, rules)
+            clear = eased
+        if not eased:
+            a, clear, trapped = _choose(scene, plan, limited, at_line, holds)
         if trapped:
             a = _least_harm(scene, a, len(samples))
+        plan.acceleration_before = a
     pairs = broken = 0
     for i in range(len(samples)):
         known = clear and (which <= TABLE or not is_left_out(scene, i))
         dangerous, kept = judge_user(scene, i, samples[i], memory[i], a, known, trapped)
         pairs += dangerous
         broken += not kept
-    changed = overrides and a != limited
+    changed = overrides and a != limited and not eased
+    anticipated = eased and a != limited
     response = 0
     if changed:
         response = RESPONSE_BRAKE if a < limited else RESPONSE_GO
     return JunctionReport(
         a,
         changed,
+        anticipated,
         limited != nominal and a == limited,
         response,
         pairs,
@@ -278,6 +294,34 @@ def _entered(paths, path, s):
     """Where on a path a driver at `s` headed for its lane [m], and the lane before, -1 = none."""
     first = paths.reached[path, cell_of(s, paths.cells[path])]
     return first * CELL, paths.lane[path, first - 1] if first > 0 else -1
+
+
+@inner
+def _ease(scene, plan, memory, wish, at_line, rules):
+    """The smoothest acceleration toward a wish that leaves a plan, and whether there is one (see `shield.easing`)."""
+    rate, tune, ego, v, dt = rules.anticipation, rules.tune, scene.ego, scene.track.v, scene.dt
+    slack = SLACK + scene.drift
+    low, high = plan.acceleration_before - tune[0] * dt, plan.acceleration_before + tune[0] * dt
+    behind = cap_behind_others(scene, memory, rate, tune)
+    smooth = limit(min(max(min(wish, behind), low), high), v, ego, dt)
+    line = cap_before_line(scene, at_line, rate, tune)
+    if smooth <= line and stop_conflict(scene, smooth, EVERYBODY, at_line, slack) == NEVER:
+        plan.go = 0
+        return smooth, True
+    go, _ = go_plan(scene, smooth, EVERYBODY, at_line, slack)
+    if go < 0 and plan.go > 0 and wish > smooth:
+        smooth = wish
+        go, _ = go_plan(scene, smooth, EVERYBODY, at_line, slack)
+    if go >= 0:
+        plan.go = go
+        return smooth, True
+    cap = min(behind, line, wish)
+    for a in (max(cap, low), cap):
+        eased = limit(a, v, ego, dt)
+        if eased < smooth and stop_conflict(scene, eased, EVERYBODY, at_line, slack) == NEVER:
+            plan.go = 0
+            return eased, True
+    return wish, False
 
 
 @inner

@@ -114,6 +114,7 @@ def start_watch(episode, distances, plans, watch):
         for i in range(len(plans.crossings)):
             plans.crossings[i] = watch.blank_crossing[0]
     episode.path, episode.go, episode.frames_trapped = -1, -1, 0
+    episode.acceleration_before, episode.frames_anticipated = 0.0, 0
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     episode.frames = episode.frames_overridden = 0
@@ -237,12 +238,14 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
         not settings.waits_anywhere,
         settings.examine,
         settings.overrides,
+        settings.rules,
     )
     if settings.overrides:
         step.acceleration_change = max(step.acceleration_change, abs(report.acceleration - car.acceleration))
         car.acceleration = report.acceleration
     _count(episode, step, report, report, report.pairs, report.broken, settings.overrides)
     episode.frames_trapped += report.trapped
+    episode.frames_anticipated += report.anticipated
     episode.pairs_examined += report.examined
     episode.pairs_possible += report.possible
 

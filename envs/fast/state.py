@@ -67,6 +67,8 @@ EPISODE = np.dtype(
         ("frame_lane", "i8"),  # lane it measures along, -1 = none yet
         ("path", "i8"),  # through the junction, -1 = none yet
         ("go", "i8"),  # frames of throttle left in its plan through a junction, -1 = no plan
+        ("acceleration_before", "f8"),  # on the last frame, where it goes by plans [m/s^2]
+        ("frames_anticipated", "i8"),  # on which anticipation changed its command
         ("refused", "?"),  # the lane change of this decision was taken back
         ("frames_trapped", "i8"),  # on which no plan stayed clear of everybody
         ("pairs_examined", "i8"),  # pair-frames on which plans were checked against somebody
