@@ -301,20 +301,24 @@ def _ease(scene, plan, memory, wish, at_line, rules):
     """The smoothest acceleration toward a wish that leaves a plan, and whether there is one (see `shield.easing`)."""
     rate, tune, ego, v, dt = rules.anticipation, rules.tune, scene.ego, scene.track.v, scene.dt
     slack = SLACK + scene.drift
-    low, high = plan.acceleration_before - tune[0] * dt, plan.acceleration_before + tune[0] * dt
-    behind = cap_behind_others(scene, memory, rate, tune)
+    low, high = plan.acceleration_before - tune[3] * dt, plan.acceleration_before + tune[0] * dt
+    behind = cap_behind_others(scene, memory, rate, tune) if tune[4] % 2 == 0 else np.inf
     smooth = limit(min(max(min(wish, behind), low), high), v, ego, dt)
-    line = cap_before_line(scene, at_line, rate, tune)
+    line = cap_before_line(scene, at_line, rate, tune) if tune[4] < 2 else np.inf
     if smooth <= line and stop_conflict(scene, smooth, EVERYBODY, at_line, slack) == NEVER:
         plan.go = 0
         return smooth, True
-    go, _ = go_plan(scene, smooth, EVERYBODY, at_line, slack)
-    if go < 0 and plan.go > 0 and wish > smooth:
-        smooth = wish
-        go, _ = go_plan(scene, smooth, EVERYBODY, at_line, slack)
+    fast = max(smooth, wish)
+    go, _ = go_plan(scene, fast, EVERYBODY, at_line, slack)
     if go >= 0:
         plan.go = go
-        return smooth, True
+        if smooth < fast:
+            for a in (smooth, 0.5 * (smooth + fast)):
+                go, _ = go_plan(scene, a, EVERYBODY, at_line, slack)
+                if go >= 0:
+                    plan.go = go
+                    return a, True
+        return fast, True
     cap = min(behind, line, wish)
     for a in (max(cap, low), cap):
         eased = limit(a, v, ego, dt)
