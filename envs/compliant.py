@@ -45,7 +45,8 @@ class TurnTaker(JunctionEgo):
     ) -> tuple[JunctionReport, float]:
         self.waited += self.settings.dt * self.needs_gap
         report, steering = super()._restrict(scene, acceleration, steering, holds)
-        self.trapped, self.is_held_back = report.trapped, report.response == RESPONSE_BRAKE
+        eased_off = report.anticipated and report.acceleration <= 0.0 < acceleration
+        self.trapped, self.is_held_back = report.trapped, report.response == RESPONSE_BRAKE or eased_off
         return report, steering
 
     def _look(self):

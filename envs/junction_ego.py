@@ -120,7 +120,7 @@ class JunctionEgo(ShieldedEgo):
             not settings.waits_anywhere,
             settings.examine,
             settings.overrides,
-            settings.rules,
+            settings.rules.anticipation,
             holds,
         )
         return report, steering

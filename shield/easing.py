@@ -1,10 +1,12 @@
-"""Anticipation for plans: of the accelerations that leave one, the smoothest (a rule of the table, `Rules.anticipation`).
+"""Anticipation for plans: of the accelerations that leave one, the smoothest (`Rules.anticipation`).
 
-A plan is safe whether it brakes gently or at `a_min_brake`, so an ego that is only held to its plans throttles until
-none is left but to brake as hard as it may. Before that, its acceleration is capped such that it comes to rest at
-`BRAKE` before its line, as long as no plan to go on is found, and behind whoever drives ahead; and it changes by no
-more than `JERK`. Nothing in the proof of plans moves: whatever is chosen here leaves a plan, or is not chosen.
+A plan brakes at `a_min_brake`, so an ego that is only held to having one throttles until nothing is left but to brake
+as hard. Before that, its acceleration is capped so that it comes to rest comfortably before its line, as long as no
+plan to go on is found, and behind whoever drives ahead; and it changes slowly. Nothing in the proof of plans moves:
+what is chosen leaves a plan, and where nothing smooth does, the ego does what it would have done without.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,72 +15,91 @@ from shield.conflict_areas import CELL, cell_of
 from shield.plans import BETWEEN, SLACK, behind_by
 
 BRAKE = 2.5  # deceleration of a comfortable stop [m/s^2]
-SETTLE = 0.5  # time constant of its end: at speed v it is over v SETTLE later, at most [s]
-JERK = 10.0  # [m/s^3]
-ROOM = 0.1  # between the place where the ego rests and where it may not [m]
+SETTLE = 0.3  # at speed v it is over this much times v later, so that its end is soft [s]
+JERK = 10.0  # by so much the acceleration changes at most [m/s^3] ...
+PULL_AWAY = 45.0  # ... but grows by so much where only a plan to go on is left, which is a matter of time [m/s^3]
+ROOM = 0.1  # between where the ego comes to rest and where it may not [m]
+
+
+class Caps(NamedTuple):
+    """Largest accelerations that leave room for a comfortable stop [m/s^2]; inf = none is needed."""
+
+    behind: float  # whoever drives ahead
+    line: float  # before a place where the ego may not rest, unless it has a plan to go on
+
+
+@compiled
+def caps(scene, memory, at_line, rate):
+    """`Caps` of the ego on one frame.
+
+    Args:
+      scene: `Scene`.
+      memory: `[N]` CROSSING of the frame before.
+      at_line: the ego may rest only where it is in nobody's way, whoever may come.
+      rate: kappa of `approach_cap` [1/s].
+    """
+    return Caps(_behind_others(scene, memory, rate), _before_line(scene, at_line, rate))
 
 
 @compiled
 def approach_cap(room, room_next, v, brake, settle, rate, dt):
-    """Largest acceleration that keeps a share of what is left before a comfortable stop has to begin [m/s^2].
+    """Largest acceleration that keeps a share of the margin before braking has to begin [m/s^2].
 
-    With the way to rest R(v) = v^2 / (2 b) + v T and the margin h = room - R(v), the largest next speed v' with
+    With the way to rest R(v) = v^2 / (2 b) + T v and the margin h = room - R(v), it leads to the largest speed v' with
 
         room' - R(v') >= (1 - kappa dt) h
 
     Args:
-      room, room_next: from the ego to where it has to rest, now and on the next sample [m].
-      v: speed of the ego, >= 0 [m/s].
+      room, room_next: how far the ego may go, now and on the next sample [m].
+      v: its speed, >= 0 [m/s].
       brake, settle: b [m/s^2] and T [s].
       rate: kappa [1/s].
       dt: length of a frame [s].
 
     Returns:
-      Not less than the constant deceleration that is over after `room`, or -`brake`.
+      Not less than -`brake`, or than the constant deceleration that comes to rest within `room`.
     """
-    margin = room - way_to_rest(v, brake, settle)
-    d = max(room_next - max(1.0 - rate * dt, 0.0) * margin, 0.0)
-    fastest = np.sqrt((brake * settle) ** 2 + 2.0 * brake * d) - brake * settle
+    margin = room - _way_to_rest(v, brake, settle)
+    way = max(room_next - max(1.0 - rate * dt, 0.0) * margin, 0.0)
+    fastest = np.sqrt((brake * settle) ** 2 + 2.0 * brake * way) - brake * settle
     hardest = max(brake, v**2 / (2.0 * room)) if room > 0.0 else np.inf
     return max((fastest - v) / dt, -hardest)
 
 
 @inner
-def way_to_rest(v, brake, settle):
+def _way_to_rest(v, brake, settle):
     """R(v) of `approach_cap` [m]."""
-    return v**2 / (2.0 * brake) + v * settle
+    return v**2 / (2.0 * brake) + settle * v
 
 
-@compiled
-def cap_before_line(scene, at_line, rate, tune):
-    """Cap of the acceleration before a place where the ego may not rest, or an obstacle; inf = none [m/s^2]."""
-    paths, track, threats = scene.paths, scene.track, scene.threats
+@inner
+def _before_line(scene, at_line, rate):
+    """Cap before the first place where the ego may not rest, and before obstacles. In the junction there is no line."""
+    paths, track = scene.paths, scene.track
     cells = paths.cells[track.path]
     here, end = cell_of(track.s, cells), cells
-    ahead = way_to_rest(track.v, tune[1], tune[2]) + (track.v + scene.ego.a_max_accel / tune[1] * track.v) / rate
-    last = min(cell_of(track.s + ahead + 2.0, cells), cells - 1)
-    if at_line and not paths.crossed[track.path, here]:
-        for i in range(here, last + 1):
-            if paths.crossed[track.path, i]:
-                end = i
-                break
-    for k in range(len(threats)):
-        if threats[k].path < 0 and here < threats[k].from_cell < end:
-            end = threats[k].from_cell
+    if at_line:
+        end = here
+        while end < cells and not paths.crossed[track.path, end]:
+            end += 1
+        end = end if end > here else cells
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        if threat.path < 0 and here < threat.from_cell:
+            end = min(end, threat.from_cell)
     if end == cells:
         return np.inf
     room = end * CELL - SLACK - scene.drift - ROOM - track.s
-    return approach_cap(room, room - track.v * scene.dt, track.v, tune[1], tune[2], rate, scene.dt)
+    return approach_cap(room, room - track.v * scene.dt, track.v, BRAKE, SETTLE, rate, scene.dt)
 
 
-@compiled
-def cap_behind_others(scene, memory, rate, tune):
-    """Cap of the acceleration behind those who drive ahead on the ego's way; inf = nobody does [m/s^2].
+@inner
+def _behind_others(scene, memory, rate):
+    """Cap behind those who drive ahead on the ego's way, if they go on as on the last frame.
 
-    Both come to rest at `BRAKE`, or the other brakes as hard as it may and the ego as hard as it has to.
+    Both come to rest comfortably, or the other brakes at `a_max_brake` and the ego at `a_min_brake`.
     """
     track, dt, cap = scene.track, scene.dt, np.inf
-    v, hard = track.v, scene.ego.a_min_brake
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if threat.path < 0 or threat.ignored or threat.left_out:
@@ -86,14 +107,17 @@ def cap_behind_others(scene, memory, rate, tune):
         ahead = -behind_by(scene.paths, track, threat)
         if not 0.0 < ahead < np.inf:
             continue
-        v_other = max(threat.v, 0.0)
-        slower = min(v_other - max(memory[threat.user].speed, 0.0), 0.0) if memory[threat.user].age > 0 else 0.0
-        v_next = max(v_other + max(slower, -scene.other.a_max_brake * dt), 0.0)
+        known = memory[threat.user]
+        v = max(threat.v, 0.0)
+        change = v - max(known.speed, 0.0) if known.age > 0 else 0.0
+        v_next = max(v + min(max(change, -scene.other.a_max_brake * dt), 0.0), 0.0)
         gap = ahead - track.half_length - threat.half_length - BETWEEN
-        moved = gap + (v_other - v) * dt
-        reach, reach_next = way_to_rest(v_other, tune[1], tune[2]), way_to_rest(v_next, tune[1], tune[2])
-        cap = min(cap, approach_cap(gap + reach, moved + reach_next, v, tune[1], tune[2], rate, dt))
-        b = scene.other.a_max_brake
-        reach, reach_next = way_to_rest(v_other, b, 0.0), way_to_rest(v_next, b, 0.0)
-        cap = min(cap, approach_cap(gap + reach, moved + reach_next, v, hard, 0.0, rate, dt))
+        gap_next = gap + (v - track.v) * dt
+        for brake, brake_other, settle in (
+            (BRAKE, BRAKE, SETTLE),
+            (scene.ego.a_min_brake, scene.other.a_max_brake, 0.0),
+        ):
+            room = gap + _way_to_rest(v, brake_other, settle)
+            room_next = gap_next + _way_to_rest(v_next, brake_other, settle)
+            cap = min(cap, approach_cap(room, room_next, track.v, brake, settle, rate, dt))
     return cap

@@ -33,7 +33,7 @@ from shield.blame import (
 from shield.compiled import apart, compiled, inner
 from shield.conflict_areas import CELL, boxes_overlap, cell_of
 from shield.controller import RESPONSE_BRAKE, RESPONSE_GO
-from shield.easing import cap_before_line, cap_behind_others
+from shield.easing import JERK, PULL_AWAY, caps
 from shield.examined import TABLE, count_examined, examine, is_left_out
 from shield.kinematics import time_to_collision
 from shield.plans import (
@@ -127,7 +127,7 @@ class JunctionReport(NamedTuple):
 
     acceleration: float  # what it lets through [m/s^2]
     overridden: bool  # somebody's presence changed it
-    anticipated: bool  # anticipation did, while a plan remained
+    anticipated: bool  # anticipation did, and left a plan
     limited: bool  # only the limits of acceleration did
     response: int  # RESPONSE_BRAKE or RESPONSE_GO where it was overridden, else 0
     pairs: int  # road users toward whom the ego is not free
@@ -139,7 +139,7 @@ class JunctionReport(NamedTuple):
 
 
 @apart
-def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides, rules, holds=False):
+def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides, rate, holds=False):
     """Restrict the ego's acceleration to what leaves it a plan, and judge everybody.
 
     Args:
@@ -152,7 +152,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
       at_line: the ego may rest only where it is in nobody's way, whoever may come.
       which: against whom plans are checked, index into `shield.examined.EXAMINED`.
       overrides: False = watch only.
-      rules: `Rules`, of which anticipation matters here.
+      rate: of anticipation, see `Rules` [1/s]; 0 = none.
       holds: the plan in force is carried out, whatever the controller asks for.
 
     Returns:
@@ -163,8 +163,8 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
     limited = limit(nominal, scene.track.v, scene.ego, scene.dt)
     a, clear, trapped, eased = nominal, False, False, False
     if overrides:
-        if rules.anticipation > 0.0 and not holds:
-            a, eased = _ease(scene, plan, memory, limited, at_line, rules)
+        if rate > 0.0 and not holds:
+            a, eased = _ease(scene, plan, memory, limited, at_line, rate)
             clear = eased
         if not eased:
             a, clear, trapped = _choose(scene, plan, limited, at_line, holds)
@@ -297,14 +297,13 @@ def _entered(paths, path, s):
 
 
 @inner
-def _ease(scene, plan, memory, wish, at_line, rules):
-    """The smoothest acceleration toward a wish that leaves a plan, and whether there is one (see `shield.easing`)."""
-    rate, tune, ego, v, dt = rules.anticipation, rules.tune, scene.ego, scene.track.v, scene.dt
-    slack = SLACK + scene.drift
-    low, high = plan.acceleration_before - tune[3] * dt, plan.acceleration_before + tune[0] * dt
-    behind = cap_behind_others(scene, memory, rate, tune) if tune[4] % 2 == 0 else np.inf
-    smooth = limit(min(max(min(wish, behind), low), high), v, ego, dt)
-    line = cap_before_line(scene, at_line, rate, tune) if tune[4] < 2 else np.inf
+def _ease(scene, plan, memory, wish, at_line, rate):
+    """The smoothest acceleration toward a wish that leaves a plan, and whether there is any (see `shield.easing`)."""
+    track, ego, slack = scene.track, scene.ego, SLACK + scene.drift
+    before, change = plan.acceleration_before, JERK * scene.dt
+    behind, line = caps(scene, memory, at_line, rate)
+    wanted = max(min(wish, behind), before - change)
+    smooth = limit(min(wanted, before + change), track.v, ego, scene.dt)
     if smooth <= line and stop_conflict(scene, smooth, EVERYBODY, at_line, slack) == NEVER:
         plan.go = 0
         return smooth, True
@@ -312,16 +311,17 @@ def _ease(scene, plan, memory, wish, at_line, rules):
     go, _ = go_plan(scene, fast, EVERYBODY, at_line, slack)
     if go >= 0:
         plan.go = go
-        if smooth < fast:
-            for a in (smooth, 0.5 * (smooth + fast)):
+        start = limit(min(wanted, before + PULL_AWAY * scene.dt), track.v, ego, scene.dt)
+        if start < fast:
+            for a in (start, 0.5 * (start + fast)):
                 go, _ = go_plan(scene, a, EVERYBODY, at_line, slack)
                 if go >= 0:
                     plan.go = go
                     return a, True
         return fast, True
     cap = min(behind, line, wish)
-    for a in (max(cap, low), cap):
-        eased = limit(a, v, ego, dt)
+    for a in (max(cap, before - change), cap):
+        eased = limit(a, track.v, ego, scene.dt)
         if eased < smooth and stop_conflict(scene, eased, EVERYBODY, at_line, slack) == NEVER:
             plan.go = 0
             return eased, True

@@ -249,7 +249,6 @@ class Rules(NamedTuple):
     anticipation: float = (
         2.0  # kappa, rate at which margins may shrink while nothing is owed [1/s]; 0 = no anticipation
     )
-    tune: tuple = (10.0, 2.5, 0.5, 10.0, 0.0)
     heading_bound: float = 0.1  # largest sine of the angle between car and lane [1]; 1 = no bound
     discretisation_margin: bool = True  # C5: explicit Euler, the last partial braking step
     overlap_margin: float = 0.1  # the simulator flags *predicted* contact, with slip left out [m]

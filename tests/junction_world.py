@@ -47,7 +47,9 @@ def crossing_pairs() -> list[tuple[int, int]]:
 class Duel:
     """The ego under the shield on one path, another car that does what it likes within its bounds on a second one."""
 
-    def __init__(self, ego_path, other_path, s_ego, v_ego, s_other, v_other, entry=CAUTIOUS, assumed=TABLE.other):
+    def __init__(
+        self, ego_path, other_path, s_ego, v_ego, s_other, v_other, entry=CAUTIOUS, assumed=TABLE.other, rate=0.0
+    ):
         self.roads = junction().roads
         self.path, self.s, self.v = ego_path, float(s_ego), float(v_ego)
         self.threats = np.zeros(1, THREAT)
@@ -56,7 +58,7 @@ class Duel:
         self.threats["priority"] = self.roads.paths.priority[ego_path, other_path]
         self.memory, self.plan = np.zeros(1, CROSSING), np.zeros(1, PLAN)
         self.plan["go"] = -1
-        self.entry, self.assumed = entry, assumed
+        self.entry, self.assumed, self.rate = entry, assumed, rate
         self.report = None
 
     def frame(self, nominal: float, a_other: float, overrides: bool = True) -> None:
@@ -67,7 +69,7 @@ class Duel:
         sample = np.zeros(1, SAMPLE)
         sample["speed"] = other["v"]
         self.report = junction_frame(
-            scene, sample, self.memory, self.plan[0], nominal, self.entry, True, TABLE_ONLY, overrides
+            scene, sample, self.memory, self.plan[0], nominal, self.entry, True, TABLE_ONLY, overrides, self.rate
         )
         a = min(max(a_other, -TABLE.other.a_max_brake), TABLE.other.a_max_accel)
         a = min(max(a, -other["v"] / DT), max((self.roads.limit - other["v"]) / DT, 0.0))

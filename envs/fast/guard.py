@@ -238,7 +238,7 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
         not settings.waits_anywhere,
         settings.examine,
         settings.overrides,
-        settings.rules,
+        settings.rules.anticipation,
     )
     if settings.overrides:
         step.acceleration_change = max(step.acceleration_change, abs(report.acceleration - car.acceleration))
