@@ -33,7 +33,7 @@ from shield.blame import (
 from shield.compiled import apart, compiled, inner
 from shield.conflict_areas import CELL, boxes_overlap, cell_of
 from shield.controller import RESPONSE_BRAKE, RESPONSE_GO
-from shield.easing import JERK, PULL_AWAY, caps
+from shield.easing import BRAKE, JERK, PULL_AWAY, caps
 from shield.examined import TABLE, count_examined, examine, is_left_out
 from shield.kinematics import time_to_collision
 from shield.plans import (
@@ -308,6 +308,8 @@ def _ease(scene, plan, memory, wish, at_line, rate):
         plan.go = 0
         return smooth, True
     fast = max(smooth, wish)
+    if plan.go > 0 and -BRAKE > line < wish:  # too late to stop comfortably: what has begun is gone through with
+        fast = max(fast, throttle(scene, track.s, track.v))
     go, _ = go_plan(scene, fast, EVERYBODY, at_line, slack)
     if go >= 0:
         plan.go = go
