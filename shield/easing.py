@@ -26,6 +26,7 @@ class Caps(NamedTuple):
 
     behind: float  # whoever drives ahead
     line: float  # before a place where the ego may not rest, unless it has a plan to go on
+    place: float  # arc length of that place, -inf = none [m]
 
 
 @compiled
@@ -38,7 +39,7 @@ def caps(scene, memory, at_line, rate):
       at_line: the ego may rest only where it is in nobody's way, whoever may come.
       rate: kappa of `approach_cap` [1/s].
     """
-    return Caps(_behind_others(scene, memory, rate), _before_line(scene, at_line, rate))
+    return Caps(_behind_others(scene, memory, rate), *_before_line(scene, at_line, rate))
 
 
 @compiled
@@ -74,7 +75,7 @@ def _way_to_rest(v, brake, settle):
 
 @inner
 def _before_line(scene, at_line, rate):
-    """Cap before the first place where the ego may not rest, and before obstacles. In the junction there is no line."""
+    """Cap before the first place where the ego may not rest, or an obstacle, and that place; none inside the junction."""
     paths, track = scene.paths, scene.track
     cells = paths.cells[track.path]
     here, end = cell_of(track.s, cells), cells
@@ -88,9 +89,10 @@ def _before_line(scene, at_line, rate):
         if threat.path < 0 and here < threat.from_cell:
             end = min(end, threat.from_cell)
     if end == cells:
-        return np.inf
+        return np.inf, -np.inf
     room = end * CELL - SLACK - scene.drift - ROOM - track.s
-    return approach_cap(room, room - track.v * scene.dt, track.v, BRAKE, SETTLE, rate, scene.dt)
+    cap = approach_cap(room, room - track.v * scene.dt, track.v, BRAKE, SETTLE, rate, scene.dt)
+    return cap, end * CELL
 
 
 @inner

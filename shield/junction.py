@@ -53,6 +53,7 @@ from shield.plans import (
     can_give_way,
     distance_behind,
     go_plan,
+    go_plan_beyond,
     look_ahead,
     on_path_of_ego,
     plan_conflict,
@@ -301,7 +302,7 @@ def _ease(scene, plan, memory, wish, at_line, rate):
     """The smoothest acceleration toward a wish that leaves a plan, and whether there is any (see `shield.easing`)."""
     track, ego, slack = scene.track, scene.ego, SLACK + scene.drift
     before, change = plan.acceleration_before, JERK * scene.dt
-    behind, line = caps(scene, memory, at_line, rate)
+    behind, line, place = caps(scene, memory, at_line, rate)
     wanted = max(min(wish, behind), before - change)
     smooth = limit(min(wanted, before + change), track.v, ego, scene.dt)
     if smooth <= line and stop_conflict(scene, smooth, EVERYBODY, at_line, slack) == NEVER:
@@ -310,13 +311,13 @@ def _ease(scene, plan, memory, wish, at_line, rate):
     fast = max(smooth, wish)
     if plan.go > 0 and -BRAKE > line < wish:  # too late to stop comfortably: what has begun is gone through with
         fast = max(fast, throttle(scene, track.s, track.v))
-    go, _ = go_plan(scene, fast, EVERYBODY, at_line, slack)
+    go, _ = go_plan_beyond(scene, fast, EVERYBODY, at_line, slack, place)
     if go >= 0:
         plan.go = go
         start = limit(min(wanted, before + PULL_AWAY * scene.dt), track.v, ego, scene.dt)
         if start < fast:
             for a in (start, 0.5 * (start + fast)):
-                go, _ = go_plan(scene, a, EVERYBODY, at_line, slack)
+                go, _ = go_plan_beyond(scene, a, EVERYBODY, at_line, slack, place)
                 if go >= 0:
                     plan.go = go
                     return a, True

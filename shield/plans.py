@@ -526,14 +526,20 @@ def go_plan(scene, a, only, at_line, slack):
       (frames of throttle, frame of the first conflict): frames = -1 if there is no such plan; then the
       latest first conflict of all, as `tail_conflict` says it.
     """
+    return go_plan_beyond(scene, a, only, at_line, slack, -np.inf)
+
+
+@compiled
+def go_plan_beyond(scene, a, only, at_line, slack, place):
+    """`go_plan`, but none that comes to rest before a `place` [m]."""
     begin(scene)
     s, v = step(scene.track.s, scene.track.v, a, scene.dt)
-    n, latest = NEXT, NOW
+    n, latest, brake = NEXT, NOW, scene.ego.a_min_brake
     while n * scene.dt < _LONGEST:
         if _meets_anyone(scene, s, v, n, only, slack):
             return -1, max(latest, n)
-        if n % _TAIL == 2:
-            conflict = tail_conflict(scene, s, v, n, scene.ego.a_min_brake, only, at_line, slack)
+        if n % _TAIL == 2 and s + stopping_distance(v, brake) >= place:
+            conflict = tail_conflict(scene, s, v, n, brake, only, at_line, slack)
             if conflict == NEVER:
                 return n - 1, NEVER
             latest = max(latest, conflict)
