@@ -14,10 +14,11 @@ from shield.compiled import compiled, inner
 from shield.conflict_areas import CELL, cell_of
 from shield.plans import BETWEEN, SLACK, behind_by
 
-BRAKE = 2.5  # deceleration of a comfortable stop [m/s^2]
-SETTLE = 0.3  # at speed v it is over this much times v later, so that its end is soft [s]
-JERK = 10.0  # by so much the acceleration changes at most [m/s^3] ...
-PULL_AWAY = 45.0  # ... but grows by so much where only a plan to go on is left, which is a matter of time [m/s^3]
+BRAKE = 3.0  # deceleration of a comfortable stop [m/s^2]
+SETTLE = 0.1  # at speed v it is over this much times v later, so that its end is soft [s]
+JERK = 15.0  # by so much the acceleration changes at most [m/s^3] ...
+PULL_AWAY = 90.0  # ... but grows by so much where only a plan to go on is left, which is a matter of time [m/s^3]
+EAGER = 4.0  # margins shrink at this many times the rate of anticipation: nobody but the ego changes them much
 ROOM = 0.1  # between where the ego comes to rest and where it may not [m]
 
 
@@ -37,9 +38,10 @@ def caps(scene, memory, at_line, rate):
       scene: `Scene`.
       memory: `[N]` CROSSING of the frame before.
       at_line: the ego may rest only where it is in nobody's way, whoever may come.
-      rate: kappa of `approach_cap` [1/s].
+      rate: of anticipation, see `Rules` [1/s].
     """
-    return Caps(_behind_others(scene, memory, rate), *_before_line(scene, at_line, rate))
+    kappa = EAGER * rate
+    return Caps(_behind_others(scene, memory, kappa), *_before_line(scene, at_line, kappa))
 
 
 @compiled
