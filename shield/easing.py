@@ -77,7 +77,7 @@ def _way_to_rest(v, brake, settle):
 
 @inner
 def _before_line(scene, at_line, rate):
-    """Cap before the first place where the ego may not rest, or an obstacle, and that place; none inside the junction."""
+    """Cap before the first place where the ego may not rest, or an obstacle, and that place; none in the junction."""
     paths, track = scene.paths, scene.track
     cells = paths.cells[track.path]
     here, end = cell_of(track.s, cells), cells
