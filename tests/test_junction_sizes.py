@@ -147,6 +147,7 @@ def test_a_freely_steered_ego_of_another_size_is_refused():
 
 def test_the_engine_refuses_cars_of_another_size(monkeypatch):
     engine = Engine(compile_scenario("intersection-v0"), 1, autoreset=DISABLED)
+    engine.seed([0])  # without a generator the traffic of an intersection is drawn for ever
     engine.reset()
     env = make("intersection-v0", shield=None)
     env.reset(seed=0)
