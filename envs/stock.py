@@ -17,6 +17,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from envs.arguments import whole
 
 LONGEST_EPISODE = 100  # decisions, where highway-env sets no limit
+LOWEST_FREQUENCY = 5  # of simulation where roads cross [Hz]
 # what `IntersectionEnv` writes into the class of its traffic, and what `IDMVehicle` is defined with
 AT_INTERSECTIONS = {"DISTANCE_WANTED": 7.0, "COMFORT_ACC_MAX": 6.0, "COMFORT_ACC_MIN": -3.0}
 ELSEWHERE = {"DISTANCE_WANTED": 10.0, "COMFORT_ACC_MAX": 3.0, "COMFORT_ACC_MIN": -5.0}
@@ -60,7 +61,11 @@ def _made(env_id: str, arguments: dict[str, Any]) -> gym.Env:
             raise ValueError(f"{given}: unknown here; expected config, render_mode or max_episode_steps") from None
         except ZeroDivisionError:  # at an intersection, who yields is decided twice a second
             frequency = (arguments.get("config") or {}).get("simulation_frequency")
-            raise ValueError(f"config simulation_frequency = {frequency}: expected >= 5 where roads cross") from None
+            if frequency is None or frequency >= LOWEST_FREQUENCY:
+                raise
+            raise ValueError(
+                f"config simulation_frequency = {frequency}: expected >= {LOWEST_FREQUENCY} where roads cross"
+            ) from None
 
 
 def check_frequencies(config: dict) -> None:

@@ -20,7 +20,7 @@ from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
 from envs.risk import RiskFrame, check_risk
 from envs.shielding import audit_of, begin_step, end_step, info_of, tell_inside
 from envs.signalised import SignalisedIntersectionEnv
-from envs.stock import check_frequencies
+from envs.stock import LOWEST_FREQUENCY, check_frequencies
 from envs.traffic import TRAFFIC
 from shield.blame import Audit
 from shield.examined import EXAMINED
@@ -32,7 +32,6 @@ from shield.risk import RiskSettings
 
 MODES = ("override", "monitor")
 WAITING = ("line", "anywhere")
-LOWEST_FREQUENCY = 5  # of simulation where roads cross [Hz]
 SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
     "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
