@@ -6,6 +6,7 @@ any       every path that fits where a car is; the worst counts
 """
 
 from copy import copy
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,9 @@ _BETWEEN = 1.0  # further from the middle of the lane it heads for, a car is on 
 # A wider car has to come nearer to it, at most to within `_ALMOST` [m], and a longer one goes further meanwhile.
 _ALMOST = 0.2
 _CLEAR, _DECAY, _TURN_TIME, _SLANT, _TURN_LENGTH = 1.5, 0.6, 0.4, 2.0, 3.0
+# While it changes lanes, a driver comes less far along the new lane than it drives: by at most this share of what is
+# left across, less from `_SWIFT` [m/s] on. In a bend it is further out, or in, until it has come nearer (`_DECAY`).
+_ASLANT, _SWIFT = 0.55, 4.0
 _ANY_LANE = -1  # all bits
 _MOST_LANES = 63  # sets of lanes are bits
 # A car that is longer than stock ones turns with a larger slip: it may be off its lane by this much more
@@ -85,7 +89,7 @@ class Roads(NamedTuple):
     lead: np.ndarray  # `[L]` how far before its start cars come to a lane [m]
     following: np.ndarray  # `[L]` each lane and those that follow, as sets of bits
     beside: np.ndarray  # `[L]` each lane and those beside it, likewise
-    alongside: np.ndarray  # `[Q, L]` path through each lane that goes on as much as possible like each path
+    alongside: np.ndarray  # `[Q, L]` path through each lane that runs as much as possible like each path
 
 
 def no_roads() -> Roads:
@@ -214,7 +218,24 @@ class Junction:
         return [p for p, steps in zip(ways, agreement, strict=True) if steps == max(agreement)]
 
     def _most_alike(self, walk, index) -> int:
-        return self._alike(index, [lane[:2] for lane in walk])[0]
+        """Of the paths through a lane, the one most like a walk: it goes on likewise for longest.
+
+        Beside the walk it has come by the same roads, too: who is still short of the lane must not be put on another
+        road that leads to it.
+        """
+        roads = [lane[:2] for lane in walk]
+        alike = self._alike(index, roads)
+        if index in walk or index[:2] not in roads:
+            return alike[0]
+        onward = {tuple(self._after(p, index)) for p in alike}
+        before = roads[: roads.index(index[:2])][::-1]
+
+        def shared(p: int) -> int:
+            come_by = [lane[:2] for lane in self.walks[p][: self.walks[p].index(index)]][::-1]
+            return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(come_by, before, strict=False)))
+
+        same = [p for p, other in enumerate(self.walks) if index in other and tuple(self._after(p, index)) in onward]
+        return max(same, key=shared)
 
     def _after(self, path: int, index) -> list[tuple]:
         walk = self.walks[path]
@@ -306,6 +327,18 @@ def track_of(roads, car, path):
     after = _DECAY * np.log(to_clear / clear) + _TURN_TIME
     at = s + longer * (_SLANT * (to_clear - clear) + _TURN_LENGTH)
     return Track(path, s, car.speed, 0.5 * car.length, beside, shift, after, at)
+
+
+@compiled
+def drift_of(roads, car, track):
+    """How much further, or less far, than a plan says the ego may come because it changes lanes [m]."""
+    if track.beside < 0:
+        return 0.0
+    lane, v = roads.lanes[car.lane], max(car.speed, 0.0)
+    s, lateral = local_coordinates(lane, car.x, car.y)
+    curvature = abs(wrap_angle(heading_at(lane, s + 1.0) - heading_at(lane, s)))
+    longer = max(car.length / CAR_LENGTH, 1.0)
+    return longer * abs(lateral) * (_ASLANT * _SWIFT / max(v, _SWIFT) + _DECAY * curvature * v)
 
 
 @compiled

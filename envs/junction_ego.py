@@ -4,7 +4,7 @@ import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
 from envs.highway import Frame, Settings, ShieldedEgo
-from envs.intent import CAR_ON_ROAD, Junction, is_outside, list_threats, track_of
+from envs.intent import CAR_ON_ROAD, Junction, drift_of, is_outside, list_threats, track_of
 from envs.paths import STOCK, Size, size_of
 from envs.signalised import SignalisedRoad
 from shield.blame import Verdict
@@ -98,11 +98,15 @@ class JunctionEgo(ShieldedEgo):
 
     def _scene(self) -> Scene:
         """What plans of this frame depend on."""
-        settings, road = self.settings, self.vehicle.road
+        road = self.vehicle.road
         track, threats, roads = self._look()
         if isinstance(road, SignalisedRoad):
             threats = self._heed_lights(road, track, threats, roads)
-        return Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt)
+        return self._scene_of(track, threats, roads)
+
+    def _scene_of(self, track, threats, roads) -> Scene:
+        settings, drift = self.settings, drift_of(roads, self.cars[-1], track)
+        return Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt, drift)
 
     def _restrict(
         self, scene: Scene, acceleration: float, steering: float, holds: bool = False
@@ -146,8 +150,7 @@ class JunctionEgo(ShieldedEgo):
             return
         self._meet()
         path = self.path
-        track, threats, roads = self._look()
-        scene = Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt)
+        scene = self._scene_of(*self._look())
         if not has_plan(scene, self.crossings, settings.entry, not settings.waits_anywhere):
             vehicle.target_lane_index, self.path = before, path
             self.refused = True

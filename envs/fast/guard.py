@@ -16,7 +16,7 @@ from envs.fast.network import Network
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from envs.fast.ufuncs import arctan, tan
 from envs.highway import MAX_SLIP
-from envs.intent import Junction, Roads, is_outside, list_threats, no_roads, track_of
+from envs.intent import Junction, Roads, drift_of, is_outside, list_threats, no_roads, track_of
 from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
 from shield.command import Command
@@ -320,7 +320,8 @@ def _scene(cars, episode, sight, plans, settings, judging):
     if count > len(sight.threats):
         episode.overflow = True
     count = min(count, len(sight.threats))
-    return Scene(roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, 0.0)
+    drift = drift_of(roads, sight.on_road[n], track)
+    return Scene(roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, drift)
 
 
 @merged
