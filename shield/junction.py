@@ -40,23 +40,21 @@ from shield.plans import (
     EVERYBODY,
     GO,
     NEVER,
-    NOW,
     PATIENCE,
     SLACK,
     STANDING,
     START_UP,
     STOP,
     Scene,
-    begin,
     behind_by,
     can_give_way,
     distance_behind,
+    first_met,
     go_plan,
     look_ahead,
     on_path_of_ego,
     plan_conflict,
     stop_conflict,
-    tail_conflict,
     throttle,
 )
 
@@ -304,7 +302,10 @@ def _choose(scene, plan, a, at_line, holds):
 
 @apart
 def _escape(scene, plan, go_now, brake):
-    """Somebody left their bounds, or appeared: a plan that stays clear of everybody, or for longest."""
+    """Somebody left their bounds, or appeared: a plan that stays clear of everybody, or on most ways, or for longest.
+
+    Most of the ways that a road user may take are not taken: a plan is the better the fewer of them it meets.
+    """
     stop_at = stop_conflict(scene, brake, EVERYBODY, ANYWHERE, 0.0)
     if stop_at == NEVER:
         plan.go = 0
@@ -314,13 +315,42 @@ def _escape(scene, plan, go_now, brake):
         plan.go = go
         return go_now, True, False
     plan.go = -1
-    begin(scene)
-    track, ego = scene.track, scene.ego
-    hard_at = tail_conflict(scene, track.s, track.v, NOW, ego.a_max_brake, EVERYBODY, ANYWHERE, 0.0)
+    hard = limit(-scene.ego.a_max_brake, scene.track.v, scene.ego, scene.dt)
+    best = brake
+    ways, at = _stops_among(scene, brake, scene.ego.a_min_brake)
+    hard_ways, hard_at = _stops_among(scene, hard, scene.ego.a_max_brake)
+    if (hard_ways, -hard_at) < (ways, -at):
+        best, ways, at = hard, hard_ways, hard_at
     # to stop comes first, unless somebody is about to arrive (junction hole H7)
-    if max(stop_at, hard_at) * scene.dt < _IMMINENT and go_at > max(stop_at, hard_at):
-        return go_now, False, True
-    return (limit(-ego.a_max_brake, track.v, ego, scene.dt) if hard_at > stop_at else brake), False, True
+    if at * scene.dt < _IMMINENT and (_goes_among(scene, go_now), -go_at) < (ways, -at):
+        best = go_now
+    return best, False, True
+
+
+@inner
+def _stops_among(scene, a, brake):
+    """On how many ways of others "this frame `a`, then `brake`" may meet somebody, and the first frame of that."""
+    ways, first = 0, NEVER
+    for k in range(len(scene.threats)):
+        at = first_met(_with_way(scene, k), a, brake)
+        ways += at < NEVER
+        first = min(first, at)
+    return ways, first
+
+
+@inner
+def _goes_among(scene, a):
+    """On how many ways of others no plan to go on stays clear of them."""
+    ways = 0
+    for k in range(len(scene.threats)):
+        ways += go_plan(_with_way(scene, k), a, EVERYBODY, ANYWHERE, 0.0)[0] < 0
+    return ways
+
+
+@inner
+def _with_way(scene, k):
+    """The scene with one way of the others only."""
+    return Scene(scene.paths, scene.track, scene.threats[k : k + 1], scene.ego, scene.other, scene.dt, scene.drift)
 
 
 @apart

@@ -519,6 +519,24 @@ def stop_conflict(scene, a, only, at_line, slack):
 
 
 @compiled
+def first_met(scene, a, brake):
+    """First frame on which "this frame `a`, then `brake` [m/s^2] and stay at rest" may meet somebody, `NEVER` if none.
+
+    `stop_conflict` says when a place to rest is reached at which somebody is met, this when the other is there. One who
+    needs longer than the longest plan is none.
+    """
+    begin(scene)
+    s, v = step(scene.track.s, scene.track.v, a, scene.dt)
+    n = NEXT
+    while n * scene.dt < _LONGEST:
+        if _meets_anyone(scene, s, v, n, EVERYBODY, 0.0):
+            return n
+        s, v = step(s, v, -brake, scene.dt)
+        n += 1
+    return NEVER
+
+
+@compiled
 def go_plan(scene, a, only, at_line, slack):
     """Find a plan "this frame `a`, then throttle, then brake" that meets nobody.
 

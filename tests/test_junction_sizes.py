@@ -92,6 +92,21 @@ def test_nor_into_whoever_crosses(kind, arm):
     assert info["episode_broken_duties"] == 0
 
 
+@pytest.mark.parametrize("route", ["o0", "o2", "o3"])
+@pytest.mark.parametrize(("s", "speed"), [(50.0, 12.0), (62.0, 8.0), (75.0, 4.0), (90.0, 4.0)])
+def test_nor_before_whoever_may_swing_wide_where_it_stops_early(s, speed, route):
+    """A long truck may reach across the ego's lane as it leaves: the ego has no sure plan, long before the truck comes.
+
+    It has to wait where the truck is in its way on one of its ways, and not to drive on to where it is on all of them.
+    """
+    lane = ("o1", "ir1", 0)
+    _, ego, _ = meet("intersection-v0", Truck, lane, s, speed, 4, route=route)
+    assert ego.position[1] > 20.0  # the junction begins at 11 m
+    info, _, _ = meet("intersection-v0", Truck, lane, s, speed, route=route)
+    assert not info["crashed"]
+    assert info["episode_broken_duties"] == 0
+
+
 def test_behind_a_truck_the_ego_stops_as_far_from_its_rear_as_from_that_of_a_car():
     def gap(kind, ahead):
         _, ego, other = meet("roundabout-v0", kind, None, ahead, 0.0, route="nxs")
