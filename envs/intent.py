@@ -32,7 +32,7 @@ from shield.compiled import compiled
 from shield.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, Paths, X, Y, cell_of, reach_beyond, reaches_into
 from shield.geometry import wrap_angle
 from shield.junction import block
-from shield.plans import KNOWN, STRAIGHT, Track
+from shield.plans import ANY, KNOWN, STRAIGHT, Track
 
 _OFF = 2.0  # lateral offset up to which a car may be on a lane [m]
 _TURNED = np.pi / 3  # angle to the lane up to which it may be [rad]
@@ -49,7 +49,7 @@ _CLEAR, _DECAY, _TURN_TIME, _SLANT, _TURN_LENGTH = 1.5, 0.6, 0.4, 2.0, 3.0
 # While it changes lanes, a driver comes less far along the new lane than it drives: by at most this share of what is
 # left across, less from `_SWIFT` [m/s] on. In a bend it is further out, or in, until it has come nearer (`_DECAY`).
 _ASLANT, _SWIFT = 0.55, 4.0
-_ANY_LANE = -1  # all bits
+_ANY_LANE = _ALL = -1  # all bits
 _MOST_LANES = 63  # sets of lanes are bits
 # A car that is longer than stock ones turns with a larger slip: it may be off its lane by this much more
 # per metre, and turned by this angle more, but never as if it drove across.
@@ -90,6 +90,7 @@ class Roads(NamedTuple):
     following: np.ndarray  # `[L]` each lane and those that follow, as sets of bits
     beside: np.ndarray  # `[L]` each lane and those beside it, likewise
     alongside: np.ndarray  # `[Q, L]` path through each lane that runs as much as possible like each path
+    onward: np.ndarray  # `[P, L]` path of stock cars through each lane that goes on like each; -1 = not by that road
 
 
 def no_roads() -> Roads:
@@ -118,6 +119,7 @@ def no_roads() -> Roads:
         np.zeros(0),
         rows,
         rows,
+        none,
         none,
     )
 
@@ -154,6 +156,7 @@ class Junction:
         self._swept: list[Swept] = []
         self._choices = np.array(through), np.array(straight)
         self._alongside = np.array([[self._most_alike(walk, index) for index in self.number] for walk in self.walks])
+        self._onward = np.array([[self._onward_from(walk, index) for index in self.number] for walk in self.walks])
         self._take_in(sizes)
 
     def _check(self) -> None:
@@ -202,6 +205,7 @@ class Junction:
             self.following,
             self.beside,
             self.alongside,
+            self._onward,
         )
 
     def choice(self, index, route) -> int:
@@ -236,6 +240,10 @@ class Junction:
 
         same = [p for p, other in enumerate(self.walks) if index in other and tuple(self._after(p, index)) in onward]
         return max(same, key=shared)
+
+    def _onward_from(self, walk, index) -> int:
+        roads = [lane[:2] for lane in walk]
+        return self._alike(index, roads)[0] if index[:2] in roads else -1
 
     def _after(self, path: int, index) -> list[tuple]:
         walk = self.walks[path]
@@ -365,7 +373,7 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
         car = cars[i]
         samples[i].x, samples[i].y, samples[i].speed = car.x, car.y, car.speed
         samples[i].wreck, samples[i].astray, samples[i].lanes, samples[i].path = car.wreck, False, 0, -1
-        samples[i].alert = car.alert
+        samples[i].alert, samples[i].strays, samples[i].ways = car.alert, False, _ALL
         before = count
         if not car.wreck:
             if intent == KNOWN and car.lane >= 0 and car.choice >= 0:
@@ -383,10 +391,18 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
             else:
                 lanes = _fitting(roads, car, memory[i].reachable if memory[i].age > 0 else 0)
                 samples[i].lanes = lanes
-                for lane in range(len(roads.lanes)):
-                    if lanes >> lane & 1:
-                        row = roads.straight[lane] if intent == STRAIGHT else roads.through[lane]
-                        count = _add(roads, track, lane, row, i, car, v_cap, threats, count)
+                expected = memory[i].ways if memory[i].age > 0 and intent == ANY else _ALL
+                for attempt in (expected, _ALL):
+                    samples[i].ways = 0
+                    for lane in range(len(roads.lanes)):
+                        if lanes >> lane & 1:
+                            row = roads.straight[lane] if intent == STRAIGHT else roads.through[lane]
+                            ways = _goes_on(roads, attempt, lane)
+                            count = _add(roads, track, lane, row, i, car, v_cap, threats, count, ways)
+                            samples[i].ways |= ways
+                    if samples[i].ways != 0 or lanes == 0:
+                        break
+                    samples[i].strays = True
         samples[i].next_lanes = _joined(samples[i].lanes, roads.following)
         samples[i].reachable = _joined(samples[i].next_lanes, roads.beside)
         samples[i].astray = count == before and not car.wreck
@@ -440,12 +456,31 @@ def _fits(lane, car, before, off, turned):
 
 
 @compiled
-def _add(roads, track, lane, row, i, car, v_cap, threats, count):
+def _goes_on(roads, ways, lane):
+    """Paths through a lane on which some of a set of paths go on; sets are bits.
+
+    Who is on a ring may leave it at any exit, but is not expected to go around once more. Else the ways that come up
+    with every lane lead further than those for which plans were made on the frame before.
+    """
+    count = len(roads.onward)
+    if count > _MOST_LANES:  # more than there are bits
+        return _ALL
+    onward = 0
+    for path in range(count):
+        if ways >> path & 1 and roads.onward[path, lane] >= 0:
+            onward |= 1 << roads.onward[path, lane]
+    return onward
+
+
+@compiled
+def _add(roads, track, lane, row, i, car, v_cap, threats, count, ways=_ALL):
     s, _ = local_coordinates(roads.lanes[lane], car.x, car.y)
     for m in range(roads.choices.shape[1]):
         path = roads.choices[row, m]
         if path < 0:
             break
+        if ways != _ALL and not ways >> path & 1:
+            continue
         path += car.size * len(roads.paths.boxes)
         if count < len(threats):
             threat = threats[count]
@@ -471,9 +506,10 @@ def _path_kept(roads, car, before):
     Paths that go on in the same way may have come from elsewhere, and then hold other cars until they have settled.
     """
     path = roads.choices[car.choice, 0] + car.size * len(roads.paths.boxes)
-    if before < 0 or np.isnan(roads.paths.offset[before, car.lane]) or roads.alongside[before, car.lane] != path:
+    if before < 0 or np.isnan(roads.paths.offset[before, car.lane]):
         return path
-    return before
+    stock = car.size * len(roads.paths.boxes)  # paths of its size, less those of stock cars
+    return before if roads.onward[before - stock, car.lane] + stock == path else path
 
 
 @compiled

@@ -85,6 +85,7 @@ CROSSING = np.dtype(
         ("y", "f8"),
         ("speed", "f8"),
         ("lanes", "i8"),  # lanes on which it may be now or next, as a set of bits
+        ("ways", "i8"),  # paths that it may be on, likewise
         ("reachable", "i8"),  # likewise, if it changes lanes
         ("ego_broke", "i8"),  # first duty each broke since the last sample with a plan, index into `blame.DUTIES`
         ("ego_excess", "f8"),
@@ -105,6 +106,8 @@ SAMPLE = np.dtype(
         ("reachable", "i8"),  # those, and lanes beside them
         ("path", "i8"),  # path that its announced route follows, -1 = none announced
         ("wreck", "?"),
+        ("ways", "i8"),  # paths that it may be on, as a set of bits
+        ("strays", "?"),  # has gone on where none of the ways leads that it might be on before
         ("astray", "?"),  # on no lane at all
         ("alert", "?"),  # is known to wait: nobody counts on it to stand
     ],
@@ -442,7 +445,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
         kept = _is_resolute(scene, a)
     memory.follows, memory.way = may_follow, scene.track.path
     memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
-    memory.reachable, memory.path = sample.reachable, sample.path
+    memory.reachable, memory.path, memory.ways = sample.reachable, sample.path, sample.ways
     memory.wreck, memory.astray = sample.wreck, sample.astray
     memory.age += 1
     memory.relied, memory.relied_before = False, memory.relied
@@ -470,7 +473,7 @@ def _judge_motion(sample, memory, other, dt):
     moved = np.hypot(sample.x - memory.x, sample.y - memory.y)
     if sample.wreck and (not memory.wreck or moved > _JITTER * dt):
         duty = CRASHED
-    elif (sample.astray and not memory.astray) or sample.lanes & ~memory.lanes != 0:
+    elif (sample.astray and not memory.astray) or sample.strays or sample.lanes & ~memory.lanes != 0:
         duty = LEFT_PATHS
     elif faster > _JITTER and not sample.wreck:
         duty, excess = ACCELERATED, faster / dt
