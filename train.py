@@ -29,6 +29,7 @@ import envs
 from agents.ppo import available_devices, hyperparameters, load_policy, rounded_timesteps, train
 from envs.configuration import check_config, default_config
 from envs.highway import PLANS
+from envs.shielding import PENALTIES
 from envs.vector import BACKENDS
 from envs.wrapper import WAITING, default_preset, scheme_of
 from eval.config_option import read_config, split_arguments, with_values
@@ -142,6 +143,8 @@ class Config:
     """Where it may wait there: at the line, or anywhere that is in the way of nobody who is there."""
     intervention_penalty: float = 0.0
     """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward."""
+    penalty_on: str = "response"
+    """What it is times: response (share of frames overridden) or change (of acceleration, mean [m/s^2])."""
     eval_episodes: int = 1000
     """Test episodes per trained model and test condition, on the same seeds for all."""
     replay_episodes: int = 5
@@ -328,8 +331,9 @@ def replaying(config: Config, preset: Preset, folder: Path, arm: str, seed: int,
 
 
 def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, progress: Progress) -> None:
+    paid: dict[str, Any] = {"intervention_penalty": config.intervention_penalty, "penalty_on": config.penalty_on}
     train(
-        functools.partial(batch, config, preset, TRAIN_MODE[arm], intervention_penalty=config.intervention_penalty),
+        functools.partial(batch, config, preset, TRAIN_MODE[arm], **paid),
         model_path(folder, arm, seed).parent,
         seed=seed,
         total_timesteps=config.total_timesteps,
@@ -390,6 +394,7 @@ def check(config: Config) -> None:
         ("intent", config.intent in INTENTS, f"one of {', '.join(INTENTS)}"),
         ("waiting", config.waiting in WAITING, f"one of {', '.join(WAITING)}"),
         ("intervention_penalty", 0 <= config.intervention_penalty < math.inf, "a number >= 0"),
+        ("penalty_on", config.penalty_on in PENALTIES, f"one of {', '.join(PENALTIES)}"),
         ("eval_episodes", config.eval_episodes >= 1, "at least 1"),
         ("replay_episodes", config.replay_episodes >= 0, "at least 0"),
         ("n_envs", 1 <= config.n_envs <= 4096, "1 to 4096"),

@@ -226,6 +226,9 @@ def row(frame: pd.DataFrame) -> list[str]:
         f"{returns.value:.2f} [{returns.low:.2f}, {returns.high:.2f}]",
         f"{frame['speed'].mean():.1f}",
         f"{100 * frame['override_share'].mean():.0f} %",
+        f"{frame['rms_jerk'].mean():.1f}",
+        f"{100 * frame['hard_braking_share'].mean():.1f} %",
+        f"{100 * frame['comfortable_share'].mean():.0f} %",
     ]
 
 
@@ -242,6 +245,9 @@ COLUMNS = (
     "return",
     "speed",
     "overridden",
+    "rms jerk",
+    "a < -3",
+    "comfortable",
 )
 
 

@@ -3,11 +3,12 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from highway_env.vehicle.controller import ControlledVehicle
+from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
 from highway_env.vehicle.objects import Landmark
 
 from envs.roads import Heading, heading_of, reach_of, road_through, tightest
 from shield.blame import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
+from shield.comfort import RIDE, gap_ahead, ride_on
 from shield.command import Command
 from shield.controller import (
     RESPONSE_BRAKE,
@@ -22,6 +23,7 @@ from shield.controller import (
 from shield.examined import TABLE
 from shield.geometry import PIECE_FIELDS, largest_half_extents
 from shield.junction import CAUTIOUS
+from shield.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from shield.lane_frame import Bend, look_ahead, same_frame, to_lane_frame_all
 from shield.pair import ROAD_USER, assess
 from shield.params import RSSParams, Rules
@@ -105,9 +107,11 @@ class StepTally:
     """What happened in one decision step, frame by frame."""
 
     def __init__(self) -> None:
-        self.frames = self.overridden = self.limited = 0
+        self.frames = self.overridden = self.anticipated = self.limited = 0
         self.dangerous_pairs = self.broken_duties = 0
-        self.acceleration_change = self.steering_change = 0.0
+        self.acceleration_change = self.steering_change = 0.0  # largest
+        self.acceleration_changed = self.steering_changed = 0.0  # sums over the frames
+        self.lane_change_refused = False
         self.margin_lon = self.margin_lat = float("inf")
         self.partner = -1
         self.response = 0
@@ -145,7 +149,10 @@ class ShieldedEgo:
         self.branches = self.road  # and everybody else
         self.jumped = np.zeros(0, bool)
         self.contact: dict | None = None
-        self.frames = self.frames_overridden = 0
+        self.frames = self.frames_overridden = self.frames_anticipated = self.frames_limited = 0
+        self.acceleration_changed = self.steering_changed = 0.0
+        self.rooms = (float("inf"), float("inf"))  # to the left and to the right, beside who is alongside [m]
+        self.ride = np.zeros(1, RIDE)[0]
         self.dangerous_pairs = self.broken_duties = 0
         self.cost = 0.0
         self.min_ttc = float("inf")
@@ -167,9 +174,11 @@ class ShieldedEgo:
 
     def act(self, action=None) -> None:
         vehicle = self.vehicle
+        before = getattr(vehicle, "target_lane_index", None)
         type(vehicle).act(vehicle, action)
         if action is not None:
             self.nominal = dict(vehicle.action)
+            self._refuse_lane_change(before)
         elif not self.check_contact():
             self._frame()
             if self.judge is not self:
@@ -192,16 +201,11 @@ class ShieldedEgo:
         wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
         rules = settings.ego, settings.other, settings.rules, settings.dt
         danger = find_danger(ego, users, *self.last, self.memory, *rules)
-        response = Response(wish, False, False)
+        self.rooms = danger.room_left, danger.room_right
+        response = Response(wish, False, False, False)
         if settings.overrides:
-            response = respond(
-                wish,
-                danger,
-                ego,
-                Body(*self.body, bend.curvature, bend.slack, self.backs_up),
-                settings.rules,
-                settings.dt,
-            )
+            body = Body(*self.body, bend.curvature, bend.slack, self.backs_up)
+            response = respond(self._taken_back(wish, ego, body), danger, ego, body, settings.rules, settings.dt)
         command = response.command
         pairs, broken = judge_frame(
             ego, users, self.memory, command, bend.curvature, settings.ego, settings.other, settings.dt
@@ -214,7 +218,9 @@ class ShieldedEgo:
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
         before, self.last = self.last, (ego, users)
-        self._count(danger, response, pairs, broken, command.acceleration - wish.acceleration, steered - steering)
+        changes = command.acceleration - wish.acceleration, steered - steering
+        self._count(danger, response, response.anticipated, pairs, broken, *changes)
+        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.dt)
         tally = self.tally
         if max(danger.margin_lon, danger.margin_lat) < max(tally.margin_lon, tally.margin_lat):
             tally.margin_lon, tally.margin_lat = danger.margin_lon, danger.margin_lat
@@ -224,19 +230,33 @@ class ShieldedEgo:
             self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
 
     def _count(
-        self, danger, response, pairs: int, broken: int, acceleration_change: float, steering_change: float
+        self,
+        danger,
+        response,
+        anticipated: bool,
+        pairs: int,
+        broken: int,
+        acceleration_change: float,
+        steering_change: float,
     ) -> None:
         tally, overrides = self.tally, self.settings.overrides
         tally.frames += 1
         tally.overridden += response.overridden and overrides
+        tally.anticipated += anticipated and overrides
         tally.limited += response.limited and overrides
         tally.dangerous_pairs += pairs
         tally.broken_duties += broken
         tally.acceleration_change = max(tally.acceleration_change, abs(acceleration_change))
         tally.steering_change = max(tally.steering_change, abs(float(steering_change)))
+        tally.acceleration_changed += abs(acceleration_change)
+        tally.steering_changed += abs(float(steering_change))
         tally.response |= danger.response
         self.frames += 1
         self.frames_overridden += response.overridden and overrides
+        self.frames_anticipated += anticipated and overrides
+        self.frames_limited += response.limited and overrides
+        self.acceleration_changed += abs(acceleration_change)
+        self.steering_changed += abs(float(steering_change))
         self.dangerous_pairs += pairs
         self.broken_duties += broken
         self.min_ttc = min(self.min_ttc, danger.ttc)
@@ -246,6 +266,69 @@ class ShieldedEgo:
         road = self.vehicle.road
         everybody = [*road.vehicles, *road.objects]
         return next((k for k, other in enumerate(everybody) if other is self.others[i]), -1)
+
+    # -- lane changes
+
+    @property
+    def _takes_back(self) -> bool:
+        return self.settings.overrides and self.settings.rules.take_back and self.settings.scheme == LANES
+
+    def _refuse_lane_change(self, before) -> None:
+        """Ignore the lane change that the agent asks for, if it is blocked or comes half-way through another."""
+        vehicle = self.vehicle
+        if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.contact is not None:
+            return
+        target = vehicle.target_lane_index
+        if target == before or target[:2] != before[:2]:
+            return
+        back = turns_back(self._offset(vehicle.lane_index), self._offset(before), target[2] - before[2])
+        if back or self._is_blocked(target):
+            vehicle.target_lane_index = before
+            self.tally.lane_change_refused = True
+
+    def _is_blocked(self, index) -> bool:
+        """Is the way to the centre of a lane blocked?"""
+        return bool(is_blocked(self._offset(index), *self.rooms))
+
+    def _offset(self, index) -> float:
+        """Offset from the centre of a lane, positive to the right [m]."""
+        return float(self.vehicle.road.network.get_lane(index).local_coordinates(self.vehicle.position)[1])
+
+    def _taken_back(self, wish: Command, ego, body: Body) -> Command:
+        """What the agent wants, unless it is stuck between two lanes; and the lane that it heads for from now on."""
+        vehicle = self.vehicle
+        if not self._takes_back:
+            return wish
+        if not isinstance(vehicle, ControlledVehicle):
+            width = vehicle.lane.width_at(0.0)
+            slip = lead_back(wish.slip, ego, width, *self.rooms, body.half_wheelbase, body.curvature, self.settings.dt)
+            if slip != wish.slip:
+                self.tally.lane_change_refused = True
+            return Command(wish.acceleration, float(slip))
+        if isinstance(vehicle, MDPVehicle):
+            target = self._reachable(vehicle.lane_index, vehicle.target_lane_index)
+            if target != vehicle.target_lane_index:
+                vehicle.target_lane_index = target
+                self.tally.lane_change_refused = True
+        return wish
+
+    def _reachable(self, here, target):
+        """Lane that the ego can get to: its target, one on the way, the one it is on, or the one it has come from."""
+        if target[:2] != here[:2]:
+            return target
+        for i in range(target[2], here[2], 1 if here[2] > target[2] else -1):
+            if not self._is_blocked((*here[:2], i)):
+                return (*here[:2], i)
+        if target != here or not self._is_blocked(here):
+            return here
+        offset = self._offset(here)
+        if abs(offset) <= OFF_CENTRE:
+            return target
+        start, end, i = here
+        i += 1 if offset > 0.0 else -1
+        if not 0 <= i < len(self.vehicle.road.network.graph[start][end]) or self._is_blocked((start, end, i)):
+            return target
+        return start, end, i
 
     # -- reading the road
 

@@ -8,6 +8,7 @@ from envs.intent import CAR_ON_ROAD, Junction, drift_of, is_outside, list_threat
 from envs.paths import STOCK, Size, size_of
 from envs.signalised import SignalisedRoad
 from shield.blame import Verdict
+from shield.comfort import ride_on
 from shield.command import Command
 from shield.conflict_areas import CELL
 from shield.held_back import held_by
@@ -88,10 +89,12 @@ class JunctionEgo(ShieldedEgo):
         if self.refused:
             report = report._replace(overridden=True, limited=False)
             self.refused = False
+            self.tally.lane_change_refused = True
         self.frames_trapped += report.trapped
         self.pairs_examined += report.examined
         self.pairs_possible += report.possible
-        self._count(report, report, report.pairs, report.broken, granted - acceleration, steered - steering)
+        self._count(report, report, False, report.pairs, report.broken, granted - acceleration, steered - steering)
+        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.dt)
         if self.record is not None:
             command = Command(granted, float(np.arctan(0.5 * np.tan(steered))))
             self.record.append(Frame(tuple(self.keys), self.poses, command))

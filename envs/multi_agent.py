@@ -12,7 +12,7 @@ from envs.arguments import actions_of, plain, rules_of, seed_of
 from envs.egos import EgoShields
 from envs.highway import Frame, Settings
 from envs.risk import check_risk
-from envs.shielding import audit_of, begin_step, end_step, info_of
+from envs.shielding import audit_of, begin_step, charge, end_step, info_of
 from envs.stock import check_frequencies
 from envs.wrapper import (
     Params,
@@ -42,10 +42,10 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
 
     Args:
       env: a highway-env environment with `MultiAgentAction`, such as intersection-multi-agent-v0/-v1/-v2.
-      intervention_penalty: subtracted from each agent's reward, times its own `override_fraction`; from one
-        reward for all, times the mean of these fractions.
-      mode, params, rules, record, entry, intent, waiting, traffic, examine, risk, judge_params, judge_rules: see
-        `ShieldWrapper`.
+      intervention_penalty: subtracted from each agent's reward, times what `penalty_on` names of its own; from one
+        reward for all, times the mean of that.
+      mode, penalty_on, params, rules, record, entry, intent, waiting, traffic, examine, risk, judge_params,
+        judge_rules: see `ShieldWrapper`.
 
     Raises:
       ValueError: as `ShieldWrapper`.
@@ -57,6 +57,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         mode: str = "override",
         params: Params = None,
         intervention_penalty: float = 0.0,
+        penalty_on: str = "response",
         rules: Rules | Mapping[str, Any] = Rules(),
         record: bool = False,
         entry: str = "cautious",
@@ -73,6 +74,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
             mode=mode,
             params=plain(params),
             intervention_penalty=plain(intervention_penalty),
+            penalty_on=penalty_on,
             rules=plain(rules),
             record=record,
             entry=entry,
@@ -84,7 +86,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
             judge_params=plain(judge_params),
             judge_rules=plain(judge_rules),
         )
-        check_options(mode, intervention_penalty, traffic)
+        check_options(mode, intervention_penalty, penalty_on, traffic)
         check_agents(env.unwrapped)
         EgoShields.__init__(self, env)
         self.mode = mode
@@ -92,7 +94,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         self.conduct = check_conduct(entry, intent, waiting, examine)
         self.rules = rules_of(rules)
         self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
-        self.intervention_penalty = float(intervention_penalty)
+        self.intervention_penalty, self.penalty_on = float(intervention_penalty), penalty_on
         self.record = record
         self.traffic = traffic
         self.risk = check_risk(risk)
@@ -132,11 +134,11 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         agents = tuple(end_step(*one) for one in zip(egos, had_contact, action, strict=True))
         info.update(agents=agents, raw_reward=reward, **traffic_info(self))
         if self.intervention_penalty > 0.0:
-            overridden = [agent["shield"]["override_fraction"] for agent in agents]
+            charges = [charge(agent, self.intervention_penalty, self.penalty_on) for agent in agents]
             if isinstance(reward, tuple):
-                reward = tuple(r - self.intervention_penalty * f for r, f in zip(reward, overridden, strict=True))
+                reward = tuple(r - c for r, c in zip(reward, charges, strict=True))
             else:
-                reward = reward - self.intervention_penalty * np.mean(overridden)
+                reward = reward - np.mean(charges)
         return observation, reward, terminated, truncated, info
 
     def _check(self) -> None:

@@ -19,6 +19,7 @@ def make(
     params: Params = None,
     rules: Rules | Mapping[str, Any] = Rules(),
     intervention_penalty: float = 0.0,
+    penalty_on: str = "response",
     record: bool = False,
     entry: str = "cautious",
     intent: str = "any",
@@ -35,8 +36,8 @@ def make(
     Args:
       env_id: "highway-fast-v0", "highway-v0", "two-way-v0", "merge-v0", "signalised-intersection-v0", ...
       shield: "override", "monitor", or None for the bare environment.
-      params, rules, intervention_penalty, record, entry, intent, waiting, traffic, examine, risk, judge_params,
-        judge_rules: see `ShieldWrapper`.
+      params, rules, intervention_penalty, penalty_on, record, entry, intent, waiting, traffic, examine, risk,
+        judge_params, judge_rules: see `ShieldWrapper`.
       kwargs: passed to `gymnasium.make`, e.g. `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:
@@ -60,6 +61,7 @@ def make(
         mode=shield,
         params=params,
         intervention_penalty=intervention_penalty,
+        penalty_on=penalty_on,
         rules=rules,
         record=record,
         entry=entry,

@@ -10,7 +10,9 @@ from envs.free_steering import FreeEgo
 from envs.highway import LANES, Settings, ShieldedEgo, StepTally, log_of, response_name
 from envs.junction_ego import JunctionEgo
 from shield.blame import Audit, audit
+from shield.comfort import comfort_of
 
+PENALTIES = ("response", "change")  # what an intervention penalty is charged for
 LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
 
 
@@ -74,14 +76,18 @@ def end_step(ego: ShieldedEgo, had_contact: bool, action: Any) -> dict[str, Any]
 def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
     """What a wrapper says about one ego after a step; see `ShieldWrapper` for the keys."""
     tally, judge = ego.tally, ego.judge
-    frames = max(tally.frames, 1)
+    frames, all_frames = max(tally.frames, 1), max(ego.frames, 1)
     return {
         "shield": {
             "intervened": tally.overridden > 0,
             "override_fraction": tally.overridden / frames,
+            "anticipation_fraction": tally.anticipated / frames,
             "limited_fraction": tally.limited / frames,
             "acceleration_change": tally.acceleration_change,
             "steering_change": tally.steering_change,
+            "mean_acceleration_change": tally.acceleration_changed / frames,
+            "mean_steering_change": tally.steering_changed / frames,
+            "lane_change_refused": tally.lane_change_refused,
             "dangerous": judge.tally.dangerous_pairs > 0,
             "dangerous_pairs": judge.tally.dangerous_pairs,
             "broken_duties": judge.tally.broken_duties,
@@ -93,11 +99,16 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
         "cost": cost,
         "blame": judge.contact["verdict"] if judge.contact else "",
         "blame_evidence": dict(judge.contact) if judge.contact else {},
-        "override_share": ego.frames_overridden / max(ego.frames, 1),
+        "override_share": ego.frames_overridden / all_frames,
+        "anticipation_share": ego.frames_anticipated / all_frames,
+        "limited_share": ego.frames_limited / all_frames,
+        "mean_acceleration_change": ego.acceleration_changed / all_frames,
+        "mean_steering_change": ego.steering_changed / all_frames,
         "episode_cost": ego.cost,
         "episode_dangerous_pairs": judge.dangerous_pairs,
         "episode_broken_duties": judge.broken_duties,
         "min_ttc": min(ego.min_ttc, LONGEST_TTC),
+        **comfort_of(ego.ride)._asdict(),
         **(ego.meter.info() if ego.meter is not None else {}),
     }
 
@@ -124,6 +135,12 @@ def tell_inside(shield: Any) -> None:
         env = env.env
     if reader is not None:
         reader.env = Told(reader.env, shield)
+
+
+def charge(info: dict[str, Any], penalty: float, penalty_on: str) -> Any:
+    """What an ego pays for the interventions of a step: the penalty times the share of frames or the mean change."""
+    shield = info["shield"]
+    return penalty * (shield["override_fraction"] if penalty_on == "response" else shield["mean_acceleration_change"])
 
 
 def audit_of(ego: ShieldedEgo) -> Audit:

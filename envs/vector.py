@@ -15,7 +15,15 @@ from envs.fast.config import Unsupported, compile_scenario
 from envs.fast.vector import FastVectorEnv
 from envs.highway import PLANS
 from envs.scenarios import make
-from envs.wrapper import MODES, Params, check_conduct, check_environment, check_options, check_params, settings_for
+from envs.wrapper import (
+    MODES,
+    Params,
+    check_conduct,
+    check_environment,
+    check_options,
+    check_params,
+    settings_for,
+)
 from shield.params import Rules
 
 BACKENDS = ("fast", "highway-env")
@@ -29,6 +37,7 @@ def make_vec(
     params: Params = None,
     rules: Rules | Mapping[str, Any] = Rules(),
     intervention_penalty: float = 0.0,
+    penalty_on: str = "response",
     config: dict | None = None,
     threads: int = 1,
     autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
@@ -49,7 +58,7 @@ def make_vec(
       num_envs: how many.
       shield: "override", "monitor", or None for bare environments.
       backend: "fast", the compiled engine, or "highway-env", the original one after the other.
-      params, rules, intervention_penalty, entry, intent, waiting, examine, traffic: see `ShieldWrapper`.
+      params, rules, intervention_penalty, penalty_on, entry, intent, waiting, examine, traffic: see `ShieldWrapper`.
       config: as for `gymnasium.make` of a highway-env environment.
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
@@ -68,10 +77,15 @@ def make_vec(
         raise ValueError(f"backend = {backend!r}: expected one of {', '.join(BACKENDS)}")
     if shield is not None and shield not in MODES:
         raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
-    check_options(shield or MODES[0], intervention_penalty, traffic)
+    check_options(shield or MODES[0], intervention_penalty, penalty_on, traffic)
     if backend == "highway-env":
         options: dict[str, Any] = dict(
-            params=params, rules=rules, intervention_penalty=intervention_penalty, config=config, traffic=traffic
+            params=params,
+            rules=rules,
+            intervention_penalty=intervention_penalty,
+            penalty_on=penalty_on,
+            config=config,
+            traffic=traffic,
         )
         options |= dict(entry=entry, intent=intent, waiting=waiting, examine=examine) | kwargs
         return _SideBySide([partial(_make_counted, env_id, shield, options)] * num_envs, autoreset_mode=autoreset_mode)
@@ -93,7 +107,8 @@ def make_vec(
         if settings.scheme == PLANS and not isinstance(stock.action_type, DiscreteMetaAction):
             kind = type(stock.action_type).__name__
             raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
-    return FastVectorEnv(scenario, num_envs, settings, float(intervention_penalty), autoreset_mode, threads)
+    by_change, penalty = penalty_on == "change", float(intervention_penalty)
+    return FastVectorEnv(scenario, num_envs, settings, penalty, autoreset_mode, threads, by_change)
 
 
 _OF_GYMNASIUM = {  # arguments of its `make_vec` that mean something else here

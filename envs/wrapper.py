@@ -18,7 +18,7 @@ from envs.arguments import action_of, number, plain, preset_of, rules_of, seed_o
 from envs.egos import EgoShields
 from envs.highway import LANES, PLANS, Frame, Settings, ShieldedEgo
 from envs.risk import RiskFrame, check_risk
-from envs.shielding import audit_of, begin_step, end_step, info_of, tell_inside
+from envs.shielding import PENALTIES, audit_of, begin_step, charge, end_step, info_of, tell_inside
 from envs.signalised import SignalisedIntersectionEnv
 from envs.stock import LOWEST_FREQUENCY, check_frequencies
 from envs.traffic import TRAFFIC
@@ -55,9 +55,10 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
     Every info has
 
       shield: dict of this step: `intervened`, `override_fraction` (share of the frames in which a
-        duty toward somebody changed the command), `limited_fraction` (frames in which only the
-        always-on limits did), `proposed_action` (after a step), `acceleration_change` [m/s^2] and
-        `steering_change` [rad] (largest), `dangerous`, `dangerous_pairs` and `broken_duties`
+        duty toward somebody changed the command: the proper response), `anticipation_fraction` (in which no duty did,
+        but anticipation), `limited_fraction` (in which only the always-on limits did), `proposed_action` (after a
+        step), `acceleration_change` [m/s^2] and `steering_change` [rad] (largest), `mean_acceleration_change` and
+        `mean_steering_change` (over the frames), `lane_change_refused`, `dangerous`, `dangerous_pairs`, `broken_duties`
         (pair-frames), and for the pair nearest to danger `partner` (index in `road.vehicles`,
         static objects after them, -1 = nobody; where roads cross, who was in the way when the ego was first
         held back in this step), `min_margin_lon`, `min_margin_lat` (gap minus required gap [m], inf = nobody);
@@ -67,7 +68,11 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
       blame: "" before a contact, then "ego", "other", "both", "inherited", or "none" (a bug).
       blame_evidence: {} or partner, kind of danger, seconds since its threshold, duties broken and
         by how much.
-      override_share, episode_cost, episode_dangerous_pairs, episode_broken_duties, min_ttc: since
+      override_share, anticipation_share, limited_share, mean_acceleration_change [m/s^2], mean_steering_change [rad]:
+        the same since reset.
+      rms_acceleration, rms_jerk, ..., hard_brakings_per_km, min_time_gap: how the ride felt since reset, see
+        `shield.comfort.Comfort`. Time gaps are measured where distances along lanes keep the ego safe.
+      episode_cost, episode_dangerous_pairs, episode_broken_duties, min_ttc: since
         reset; min_ttc [s] is at most 100.
       raw_reward: the environment's own reward (after a step).
       time: since reset [s].
@@ -88,7 +93,9 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
       params: name of a preset, `Preset`, a pair of `RSSParams` (ego, other), a dict of RSS parameters that both have,
         a dict of two such dicts ("ego", "other"), or None: "intersection" at intersections, "simulator" elsewhere.
         What a dict leaves out is that of None.
-      intervention_penalty: subtracted from the reward, times the step's `override_fraction`.
+      intervention_penalty: subtracted from the reward, times what `penalty_on` names.
+      penalty_on: "response", the step's `override_fraction` (the penalty is per decision that is overridden on all
+        frames), or "change", its `mean_acceleration_change` (the penalty is per m/s^2).
       rules: which duties and margins are in force, for ablations: `Rules`, or a dict of those that differ.
       record: keep every frame of the episode in `frames`, for `audit`.
       entry: whom the ego expects to give way at a junction: "cautious" nobody, "priority" who must
@@ -116,6 +123,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         mode: str = "override",
         params: Params = None,
         intervention_penalty: float = 0.0,
+        penalty_on: str = "response",
         rules: Rules | Mapping[str, Any] = Rules(),
         record: bool = False,
         entry: str = "cautious",
@@ -132,6 +140,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
             mode=mode,
             params=plain(params),
             intervention_penalty=plain(intervention_penalty),
+            penalty_on=penalty_on,
             rules=plain(rules),
             record=record,
             entry=entry,
@@ -143,7 +152,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
             judge_params=plain(judge_params),
             judge_rules=plain(judge_rules),
         )
-        check_options(mode, intervention_penalty, traffic)
+        check_options(mode, intervention_penalty, penalty_on, traffic)
         check_environment(env.unwrapped)
         EgoShields.__init__(self, env)
         self.mode = mode
@@ -151,7 +160,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         self.conduct = check_conduct(entry, intent, waiting, examine)
         self.rules = rules_of(rules)
         self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
-        self.intervention_penalty = float(intervention_penalty)
+        self.intervention_penalty, self.penalty_on = float(intervention_penalty), penalty_on
         self.record = record
         self.traffic = traffic
         self.risk = check_risk(risk)
@@ -205,7 +214,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         self._action, self._had_contact, self._told = action, begin_step(self._stepping[0]), False
         observation, reward, terminated, truncated, info = self.env.step(executed)
         self.tell(info, reward)
-        reward = reward - self.intervention_penalty * info["shield"]["override_fraction"]
+        reward = reward - charge(info, self.intervention_penalty, self.penalty_on)
         return observation, reward, terminated, truncated, info
 
     def tell(self, info: dict, reward: Any) -> None:
@@ -243,10 +252,12 @@ def traffic_info(wrapper) -> dict[str, Any]:
     return {"traffic_blame": tuple(contact["verdict"] for contact in contacts)}
 
 
-def check_options(mode: str, intervention_penalty: float, traffic: str) -> None:
+def check_options(mode: str, intervention_penalty: float, penalty_on: str, traffic: str) -> None:
     if mode not in MODES:
         raise ValueError(f"mode = {mode!r}: expected one of {', '.join(MODES)}")
-    number("intervention_penalty", intervention_penalty)
+    number("intervention_penalty", intervention_penalty, 0.0)
+    if penalty_on not in PENALTIES:
+        raise ValueError(f"penalty_on = {penalty_on!r}: expected one of {', '.join(PENALTIES)}")
     if traffic not in TRAFFIC:
         raise ValueError(f"traffic = {traffic!r}: expected one of {', '.join(TRAFFIC)}")
 

@@ -40,6 +40,12 @@ METRICS = (
     Metric("speed", "speed", "m/s", "mean", 1, 1),
     Metric("length", "length", "steps", "mean", 1, 1, (0, math.inf)),
     Metric("override_share", "overridden", "%", "mean", 100, 0, (0, 1)),
+    Metric("anticipation_share", "anticipated", "%", "mean", 100, 0, (0, 1)),
+    Metric("mean_acceleration_change", "change", "m/s²", "mean", 1, 1, (0, math.inf)),
+    Metric("rms_jerk", "rms jerk", "m/s³", "mean", 1, 1, (0, math.inf)),
+    Metric("hard_braking_share", "hard braking", "%", "mean", 100, 0, (0, 1)),
+    Metric("comfortable_share", "comfortable", "%", "mean", 100, 0, (0, 1)),
+    Metric("min_time_gap", "min time gap", "s", "median", 1, 1, (0, math.inf)),
     Metric("min_ttc", "min TTC", "s", "median", 1, 1, (0, math.inf)),
 )
 

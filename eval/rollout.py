@@ -9,6 +9,13 @@ import numpy as np
 import pandas as pd
 
 NO_CONTACT = "no contact"  # blame in tables: an empty text would come back from a CSV file as a missing value
+# what was changed, and how the ride felt
+RIDE = (
+    *("anticipation_share", "limited_share", "mean_acceleration_change", "mean_steering_change"),
+    *("rms_acceleration", "rms_jerk", "rms_lateral_acceleration", "rms_lateral_jerk", "rms_yaw_acceleration"),
+    *("p99_acceleration", "p99_jerk", "p99_lateral_acceleration", "p99_lateral_jerk", "p99_yaw_acceleration"),
+    *("comfortable_share", "hard_braking_share", "hard_brakings_per_km", "min_time_gap", "mean_time_gap"),
+)
 MakeEnv = Callable[[], Any]  # builds a gymnasium environment whose info has the shield's keys
 Policy = Callable[[Any], Any]  # observation -> action
 
@@ -83,8 +90,8 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
     NO_CONTACT; inherited: blame is "inherited"; time: how long the episode lasted [s]; success: the car has
     reached its goal untouched (no such column where there is no goal); cost: sum; override_share: of
     the simulation frames; dangerous_pairs, broken_duties: pair-frames in danger, and those on which the
-    car broke its duty; min_ttc: smallest time to collision [s]; evidence: the verdict's grounds as JSON,
-    {} without contact.
+    car broke its duty; min_ttc: smallest time to collision [s]; what was changed and how the ride felt: the keys
+    `RIDE`, as `envs.ShieldWrapper` documents them; evidence: the verdict's grounds as JSON, {} without contact.
     """
     env = make_env()
     try:
@@ -123,6 +130,7 @@ def _record(seed: int, total_reward: float, total_speed: float, length: int, inf
         "dangerous_pairs": int(info["episode_dangerous_pairs"]),
         "broken_duties": int(info["episode_broken_duties"]),
         "min_ttc": float(info["min_ttc"]),
+        **{name: float(info[name]) for name in RIDE if name in info},
         "evidence": json.dumps(info["blame_evidence"] if blame else {}, default=_plain),
     }
 

@@ -4,14 +4,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shield.anticipation import acceleration_cap, farthest_bound, lateral_cap
 from shield.chosen import how_many, which
 from shield.command import Command
 from shield.compiled import compiled, inner
 from shield.geometry import signed_gap
 from shield.kinematics import time_to_collision
+from shield.lane_changes import room_beside
 from shield.lane_frame import beyond
+from shield.lateral import d_min_no_credit, lateral_euler_margin
 from shield.longitudinal import reach_from_rest
-from shield.pair import STANDSTILL, assess, leading_speed, least_cosine, least_margin, own_share, toward
+from shield.pair import (
+    STANDSTILL,
+    assess,
+    is_following,
+    leading_speed,
+    least_cosine,
+    least_margin,
+    own_share,
+    sampling_margin,
+    toward,
+)
 from shield.response import (
     Bounds,
     catch_up,
@@ -29,7 +42,10 @@ class Danger(NamedTuple):
     """What the shield saw on one frame."""
 
     free: Bounds  # what the ego may do while it owes nobody anything
-    bounds: Bounds  # what it may do now
+    bounds: Bounds  # what its duties leave of that
+    eased: Bounds  # and what anticipation leaves
+    room_left: float  # how far it may go to either side beside who is alongside [m]; inf if nobody is
+    room_right: float
     dangerous: bool
     partner: int  # index of the road user nearest to danger, -1 if alone
     margin_lon: float  # of that pair [m]; inf if alone
@@ -43,6 +59,7 @@ class Response(NamedTuple):
 
     command: Command  # what it lets through
     overridden: bool  # a duty toward somebody changed the command
+    anticipated: bool  # no duty did, but anticipation
     limited: bool  # only the always-on limits did
 
 
@@ -102,7 +119,9 @@ def find_danger(
       `Danger`.
     """
     free = always_on(ego, ego_params, rules, dt)
-    bounds = free
+    bounds, cap, left, right = free, np.inf, np.inf, np.inf
+    room_left = room_right = np.inf
+    look = look_ahead_of(ego, ego_params, other_params, rules, dt)
     worst, partner, margin_lon, margin_lat, ttc = nearest, -1, np.inf, np.inf, soonest
     dangerous, response = False, 0
     share_ego = own_share(ego.speed, ego.cos, ego_params, dt)
@@ -124,7 +143,12 @@ def find_danger(
             other_params,
             dt,
         )
-        if memory[i].since == 0 and margin > max(worst, far) and not _may_be_next(ego, user, ttc, rules):
+        if (
+            memory[i].since == 0
+            and margin > max(worst, far)
+            and not _may_be_next(ego, user, ttc, rules)
+            and not _may_bind(ego, user, margin, look)
+        ):
             memory[i].skipped = True
             continue
         catch_up(memory[i], ego_before, users_before[i], ego_params, other_params, rules, dt)
@@ -133,6 +157,21 @@ def find_danger(
         bounds = merge(bounds, memory[i], ego_params, rules, dt)
         if rules.limits and not may_back_up(memory[i], pair):
             bounds = _hold(bounds, held)
+        if memory[i].since == 0 and rules.anticipation > 0.0:
+            if pair.safe_lon and not pair.safe_lat:
+                cap = min(cap, _cap_behind(pair, memory[i], ego_params, other_params, rules, dt))
+            elif pair.safe_lat and not pair.safe_lon:
+                limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, ego_params, rules.anticipation, dt)
+                if pair.side > 0.0:
+                    right = min(right, limit)
+                else:
+                    left = min(left, limit)
+        if rules.take_back and not pair.safe_lon and pair.gap_lat > -min(ego.half_width, user.half_width):
+            room = room_beside(pair.margin_lat, pair.w_ego, ego_params, dt)
+            if pair.side > 0.0:
+                room_right = min(room_right, room)
+            else:
+                room_left = min(room_left, room)
         if memory[i].since > 0:
             dangerous = True
             braking = owes_braking(memory[i], rules)
@@ -146,7 +185,17 @@ def find_danger(
             worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat
         if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
             ttc = min(ttc, time_to_collision(pair.gap_lon, pair.v_ego - pair.v_other))
-    return Danger(free, bounds, dangerous, partner, margin_lon, margin_lat, response, ttc)
+    eased = Bounds(
+        bounds.a_lower,
+        min(bounds.a_upper, cap),
+        min(bounds.left, left),
+        min(bounds.right, right),
+        min(bounds.left_next, left),
+        min(bounds.right_next, right),
+        bounds.v_lower,
+    )
+    rooms = room_left, room_right
+    return Danger(free, bounds, eased, *rooms, dangerous, partner, margin_lon, margin_lat, response, ttc)
 
 
 @compiled
@@ -169,9 +218,73 @@ def respond(nominal, danger, ego, body, rules, dt):
       `Response`.
     """
     limited = restrict(nominal, danger.free, ego, body, rules, dt)
-    command = restrict(nominal, danger.bounds, ego, body, rules, dt) if danger.bounds != danger.free else limited
-    overridden = command != limited
-    return Response(command, overridden, limited != nominal and not overridden)
+    owed = restrict(nominal, danger.bounds, ego, body, rules, dt) if danger.bounds != danger.free else limited
+    command = restrict(nominal, danger.eased, ego, body, rules, dt) if danger.eased != danger.bounds else owed
+    overridden = owed != limited
+    anticipated = command != owed and not overridden
+    return Response(command, overridden, anticipated, limited != nominal and not overridden and not anticipated)
+
+
+@inner
+def _cap_behind(pair, memory, ego_params, other_params, rules, dt):
+    """Cap of the acceleration behind a pair's other, inf where it is not ahead the same way [m/s^2]."""
+    if not pair.ego_is_rear or not is_following(pair.v_ego, pair.v_other, pair.opposite):
+        return np.inf
+    return acceleration_cap(
+        pair.gap_lon,
+        pair.margin_lon,
+        pair.v_ego,
+        pair.v_other,
+        memory.acceleration_other,
+        ego_params,
+        other_params,
+        rules.anticipation,
+        dt,
+    )
+
+
+class LookAhead(NamedTuple):
+    """Whom anticipation may be about."""
+
+    within: float  # margin below which it may bind behind a leader that stands, -inf = never [m]
+    horizon: float  # how much farther per speed of the leader [s]
+    lateral: float  # distance across the lane that keeps a car safe which does not move sideways [m]
+
+
+@compiled
+def look_ahead_of(ego, ego_params, other_params, rules, dt):
+    """`LookAhead` of the ego on one frame."""
+    if rules.anticipation == 0.0:
+        return LookAhead(-np.inf, 0.0, 0.0)
+    w = max(toward(1.0, ego), toward(-1.0, ego), 0.0)
+    lateral = d_min_no_credit(w, 0.0, ego_params, other_params) + rules.overlap_margin
+    lateral += lateral_euler_margin(w, ego_params, dt) + sampling_margin(0.0, other_params, dt)
+    within, horizon = farthest_bound(max(ego.speed, 0.0), ego_params, other_params, rules.anticipation, dt)
+    return LookAhead(within, horizon, lateral)
+
+
+@compiled
+def may_bind(ahead, margin, gap_lat, drifts, speed, look):
+    """May anticipation cap the ego's acceleration for somebody? If not, nothing depends on measuring the pair.
+
+    Args:
+      ahead: of the ego.
+      margin: a lower bound of the margin of Def. 1 [m].
+      gap_lat: across the lane, or less [m].
+      drifts: does the user move sideways?
+      speed: of the user [m/s].
+      look: `LookAhead`.
+    """
+    if not ahead or (gap_lat >= look.lateral and not drifts):
+        return False
+    return margin < look.within + look.horizon * max(speed, 0.0)
+
+
+@inner
+def _may_bind(ego, user, margin, look):
+    """`may_bind` of a measured pair."""
+    gap_lat = signed_gap(user.y - ego.y, ego.half_width, user.half_width)
+    return may_bind(user.s >= ego.s, margin, gap_lat, user.u != 0.0 or user.sin != 0.0, user.speed, look)
 
 
 @inner

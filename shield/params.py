@@ -246,6 +246,8 @@ class Rules(NamedTuple):
     no_credit: bool = True  # lateral distance without credit for receding (hole H22)
     present_duties: bool = True  # in danger, also answer the situation as it is now (holes H6, H23)
     brake_if_inherited: bool = True  # brake at a_max_brake where danger was never anybody's doing
+    take_back: bool = True  # a blocked lane change is taken back, one half done completed
+    anticipation: float = 2.0  # kappa: rate at which margins may shrink before there is danger, 0 = any [1/s]
     heading_bound: float = 0.1  # largest sine of the angle between car and lane [1]; 1 = no bound
     discretisation_margin: bool = True  # C5: explicit Euler, the last partial braking step
     overlap_margin: float = 0.1  # the simulator flags *predicted* contact, with slip left out [m]

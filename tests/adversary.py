@@ -121,14 +121,15 @@ def world(
     """The default table at frame length `dt`, response times in whole frames.
 
     `bare` takes out every spare room that hides a missing margin: wobble width, standstill gap and, by very
-    short cars, the room that a car needs to turn in.
+    short cars, the room that a car needs to turn in. The ego anticipates nothing unless `table` or `rules` say so:
+    there would be less danger to tell of.
     """
     base = PRESETS["simulator"]
     spare = dict(mu=0.0, standstill_gap=0.0) if bare else {}
     ego, other = base.ego._replace(**spare | (ego or {})), base.other._replace(**spare | (other or {}))
     ego = ego._replace(response_time=float(frames_for(max(ego.response_time, dt), dt) * dt))
     other = other._replace(response_time=float(frames_for(other.response_time, dt) * dt))
-    table = Rules(**table or {})
+    table = Rules(**{"anticipation": 0.0} | (table or {}))
     rules = table._replace(**rules or {})
     return World(
         ego, other, rules, rules._replace(**steering or {}), table, dt, frames, 0.02 if bare else 5.0, **fields

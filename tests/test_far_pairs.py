@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from envs import make
+from shield.anticipation import acceleration_cap, lateral_cap
 from shield.controller import find_danger
 from shield.pair import ROAD_USER, assess, leading_speed, least_cosine, least_margin, own_share
 from shield.params import PRESETS, Rules
@@ -87,10 +88,13 @@ def episodes(env_id, count):
 
 @pytest.mark.parametrize("env_id", ["highway-fast-v0", "two-way-v0", "merge-v1"])
 def test_memory_and_report_are_those_of_a_look_at_everybody(env_id):
-    skipped = dangerous = 0
+    skipped = dangerous = anticipated = 0
     for env, _ in episodes(env_id, 4):
         quick, full = replay(env.frames, env.settings)
-        for (memory, report), (thorough, nearest, ttc) in zip(quick, full, strict=True):
+        for (memory, report), (thorough, nearest, ttc, caps) in zip(quick, full, strict=True):
+            eased = report.eased
+            assert (eased.a_upper, eased.left, eased.right) == caps
+            anticipated += eased != report.bounds
             skipped += memory["skipped"].sum()
             dangerous += (memory["since"] > 0).sum()
             assert (memory["since"] == thorough["since"]).all()
@@ -99,7 +103,20 @@ def test_memory_and_report_are_those_of_a_look_at_everybody(env_id):
                 if field != "age":
                     assert (memory[field][in_danger] == thorough[field][in_danger]).all(), field
             assert (report.margin_lon, report.margin_lat, report.ttc) == (*nearest, ttc)
-    assert skipped > 100 and dangerous > 0
+    assert skipped > 100 and dangerous > 0 and anticipated > 10
+
+
+def caps_of(pair, memory, settings):
+    """What anticipation of one safe pair leaves: acceleration, lateral speed to the left and to the right."""
+    ego_params, other_params, rules, _, dt = settings[:5]
+    cap = left = right = np.inf
+    if pair.safe_lon and not pair.safe_lat and pair.ego_is_rear and not pair.opposite and pair.v_other >= 0.0:
+        seen = pair.gap_lon, pair.margin_lon, pair.v_ego, pair.v_other, memory["acceleration_other"]
+        cap = acceleration_cap(*seen, ego_params, other_params, rules.anticipation, dt)
+    if pair.safe_lat and not pair.safe_lon:
+        limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, ego_params, rules.anticipation, dt)
+        left, right = (left, limit) if pair.side > 0.0 else (limit, right)
+    return cap, left, right
 
 
 def replay(frames, settings):
@@ -113,6 +130,8 @@ def replay(frames, settings):
         report = find_danger(frame.ego, frame.users, last[-1], last[:-1], memory, *settings[:3], dt)
         quick.append((memory.copy(), report))
         nearest, ttc = (np.inf, np.inf), np.inf
+        bounds = report.bounds
+        caps = [bounds.a_upper, bounds.left, bounds.right]
         for i, user in enumerate(frame.users):
             pair = assess(frame.ego, user, ego_params, other_params, rules, dt)
             remember(thorough[i], pair, frame.ego, user, dt)
@@ -120,7 +139,9 @@ def replay(frames, settings):
                 nearest = pair.margin_lon, pair.margin_lat
             if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
                 ttc = min(ttc, max(pair.gap_lon, 0.0) / (pair.v_ego - pair.v_other))
-        full.append((thorough.copy(), nearest, ttc))
+            if thorough[i]["since"] == 0:
+                caps = np.minimum(caps, caps_of(pair, thorough[i], settings))
+        full.append((thorough.copy(), nearest, ttc, tuple(caps)))
         last = np.append(frame.users, np.array([frame.ego], ROAD_USER))
     return quick, full
 
@@ -146,6 +167,7 @@ def test_who_is_of_no_interest_changes_nothing_else():
             sooner += free.ttc < limits[1]
             assert found.ttc == min(free.ttc, limits[1])
             assert (found.bounds, found.dangerous, found.response) == (free.bounds, free.dangerous, free.response)
+            assert found.eased == free.eased
             assert (memory["since"] == bounded["since"]).all()
             last = np.append(frame.users, np.array([frame.ego], ROAD_USER))
     assert min(nearer, farther, sooner) > 10

@@ -22,10 +22,10 @@ def straight_road(lanes=2):
     return Road(RoadNetwork.straight_road_network(lanes, speed_limit=30), np_random=np.random.default_rng(0))
 
 
-def shielded(road, x=0.0, lane=0, speed=25.0, overrides=True):
+def shielded(road, x=0.0, lane=0, speed=25.0, overrides=True, rules=Rules(anticipation=0.0, take_back=False)):
     vehicle = MDPVehicle(road, [x, 4.0 * lane], heading=0.0, speed=speed)
     road.vehicles.append(vehicle)
-    return ShieldedEgo(vehicle, Settings(TABLE.ego, TABLE.other, Rules(), overrides, DT), record=True)
+    return ShieldedEgo(vehicle, Settings(TABLE.ego, TABLE.other, rules, overrides, DT), record=True)
 
 
 def drive(road, frames):

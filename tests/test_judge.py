@@ -97,7 +97,9 @@ def test_a_sweep_over_response_times_has_one_judge():
 
 def test_a_shield_without_a_duty_is_at_fault_by_the_full_table():
     env = make(
-        "highway-fast-v0", rules={"longitudinal": False, "lateral": False, "present_duties": False}, judge_rules=Rules()
+        "highway-fast-v0",
+        rules={"longitudinal": False, "lateral": False, "present_duties": False, "anticipation": 0.0},
+        judge_rules=Rules(),
     )
     verdicts = []
     for seed in range(4):

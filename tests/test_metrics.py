@@ -25,6 +25,12 @@ def episodes_of(blames: list[str], train: str = "off", test: str = "off", crashe
             "speed": 25.0,
             "length": 10,
             "override_share": 0.25,
+            "anticipation_share": 0.5,
+            "mean_acceleration_change": 1.5,
+            "rms_jerk": np.arange(n, dtype=float),
+            "hard_braking_share": 0.125,
+            "comfortable_share": 0.75,
+            "min_time_gap": np.arange(n, dtype=float),
             "min_ttc": np.arange(n, dtype=float),
         }
     )
@@ -56,6 +62,12 @@ def test_a_cell_is_summarised_by_hand_computed_values():
         "speed": 25.0,
         "length": 10.0,
         "override_share": 0.25,
+        "anticipation_share": 0.5,
+        "mean_acceleration_change": 1.5,
+        "rms_jerk": 1.5,
+        "hard_braking_share": 0.125,
+        "comfortable_share": 0.75,
+        "min_time_gap": 1.5,  # median likewise
         "min_ttc": 1.5,  # median of 0, 1, 2, 3
     }
     assert summary["value"].to_dict() == pytest.approx(expected)

@@ -120,3 +120,4 @@ def test_every_rule_of_the_proof_is_in_force_by_default():
     assert switches and all(switches)
     assert 0.0 < rules.heading_bound < 1.0
     assert rules.overlap_margin > 0.0
+    assert rules.anticipation > 0.0

@@ -5,8 +5,10 @@ import pytest
 
 from envs import make
 from envs.traffic import RECKLESS
+from shield.params import Rules
 
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
+TURNS = (Rules(anticipation=0.0, take_back=False), Rules())  # in turn: without anticipation there is more danger
 
 
 def random_action(env, rng):
@@ -50,10 +52,10 @@ CASES = [
     ids=[f"{case[0]}-{case[1].__name__}-{i}" for i, case in enumerate(CASES)],
 )
 def test_the_shielded_ego_keeps_every_duty_and_is_never_to_blame(env_id, policy, config, episodes):
-    env = make(env_id, config=config)
     pairs = 0
     for seed in range(episodes):
         rng = np.random.default_rng(seed)
+        env = make(env_id, config=config, rules=TURNS[seed % 2])
         env.reset(seed=seed)
         done = False
         while not done:

@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+from eval.metrics import METRICS
 from shield.params import RSSParams
 
 SCRIPT = Path(__file__).parent.parent / "train.py"
@@ -67,6 +68,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--workers 0", "--workers 0 is out of range: expected 1 to 256"),
         ("--device abacus", "--device abacus is out of range: expected one of auto, cpu"),
         ("--name ../home", "--name ../home is out of range: expected letters, digits and"),
+        ("--penalty-on frames", "--penalty-on frames is out of range: expected one of response, change"),
         ("--intervention-penalty nan", "--intervention-penalty nan is out of range: expected a number >= 0"),
         ("--resume --overwrite", "expected --resume or --overwrite, not both"),
         ("--env-id no-such-road", "'no-such-road'"),
@@ -230,7 +232,7 @@ def test_every_cell_of_a_run_plays_the_same_seeds(finished):
     assert list(seeds.values()) == [[10**9, 10**9 + 1, 10**9 + 2]] * 4
     assert (episodes.loc[episodes["test"] == "off", "override_share"] == 0).all()
     cells = json.loads((folder / "results.json").read_text())["cells"]
-    assert len(cells) == 40
+    assert len(cells) == 4 * len(METRICS)
     assert all(cell["n"] == 3 for cell in cells)
 
 

@@ -12,7 +12,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
 from envs import ShieldWrapper, make
-from shield import PRESETS, RSSParams
+from shield import PRESETS, RSSParams, Rules
 
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
 DISCRETE = {"action": {"type": "DiscreteAction"}}
@@ -123,9 +123,13 @@ def test_every_info_has_the_documented_keys():
     shield_keys = {
         "intervened",
         "override_fraction",
+        "anticipation_fraction",
         "limited_fraction",
         "acceleration_change",
         "steering_change",
+        "mean_acceleration_change",
+        "mean_steering_change",
+        "lane_change_refused",
         "dangerous",
         "dangerous_pairs",
         "broken_duties",
@@ -141,7 +145,11 @@ def test_every_info_has_the_documented_keys():
 
 
 def test_the_penalty_is_the_share_of_overridden_frames_and_the_raw_reward_stays():
-    plain, penalised = make_shielded(), make("highway-fast-v0", intervention_penalty=0.5)
+    rules = Rules(anticipation=0.0)  # there is more danger without
+    plain, penalised = (
+        make("highway-fast-v0", rules=rules),
+        make("highway-fast-v0", rules=rules, intervention_penalty=0.5),
+    )
     plain.reset(seed=0)
     penalised.reset(seed=0)
     overridden = 0
@@ -152,6 +160,31 @@ def test_the_penalty_is_the_share_of_overridden_frames_and_the_raw_reward_stays(
         assert reward_penalised == pytest.approx(reward - 0.5 * info["shield"]["override_fraction"], abs=1e-12)
         overridden += info["shield"]["intervened"]
     assert overridden > 0
+
+
+def test_the_penalty_may_be_charged_by_the_size_of_the_change():
+    plain, penalised = make_shielded(), make("highway-fast-v0", intervention_penalty=0.5, penalty_on="change")
+    plain.reset(seed=0)
+    penalised.reset(seed=0)
+    for _ in range(10):
+        _, reward, _, _, info = plain.step(3)
+        _, reward_penalised, *_ = penalised.step(3)
+        assert reward_penalised == pytest.approx(reward - 0.5 * info["shield"]["mean_acceleration_change"], abs=1e-12)
+    assert info["mean_acceleration_change"] > 0.0
+
+
+def test_every_frame_counts_once_by_the_strongest_reason():
+    for rules in (Rules(), Rules(anticipation=0.0)):
+        env = make("highway-fast-v0", rules=rules)
+        env.reset(seed=0)
+        for action in (3, 3, 0, 2, 3, 3, 2, 3):
+            *_, info = env.step(action)
+            shield = info["shield"]
+            shares = [shield[f"{name}_fraction"] for name in ("override", "anticipation", "limited")]
+            assert sum(shares) <= 1.0 + 1e-12
+            assert shield["intervened"] == (shares[0] > 0.0)
+            assert shield["mean_acceleration_change"] <= shield["acceleration_change"] + 1e-12
+        assert (info["anticipation_share"] > 0.0) == (rules.anticipation > 0.0)
 
 
 def test_an_agent_that_drives_into_the_car_ahead_is_blamed_with_evidence():
@@ -182,6 +215,8 @@ def test_an_agent_that_drives_into_the_car_ahead_is_blamed_with_evidence():
         ({"waiting": "inside"}, r"waiting = 'inside': expected one of line, anywhere"),
         ({"config": {"controlled_vehicles": 2}}, r"controlled_vehicles = 2: expected exactly 1"),
         ({"config": {"action": {"type": "ContinuousAction", "dynamical": True}}}, r"dynamical = True"),
+        ({"penalty_on": "frames"}, r"penalty_on = 'frames': expected one of response, change"),
+        ({"rules": Rules(anticipation=-1.0)}, r"rules.anticipation = -1.0: expected a finite number >= 0"),
         ({"intervention_penalty": -1.0}, r"intervention_penalty = -1.0: expected a finite number >= 0"),
         ({"params": PRESETS["simulator"].ego}, r"expected a Preset, a pair of RSSParams"),
     ],

@@ -31,6 +31,7 @@ from envs.fast.guard import (
     no_ways,
     plans_of,
     refuse_lane_change,
+    report_comfort,
     start_tally,
     start_watch,
     watch_frame,
@@ -46,6 +47,7 @@ from envs.fast.threads import Crew
 from envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from envs.highway import PLANS, Settings
 from envs.wrapper import scheme_of
+from shield.comfort import RIDE
 from shield.compiled import compiling_quickly, rare
 from shield.junction import CROSSING
 from shield.params import PRESETS, Rules
@@ -83,6 +85,7 @@ class Batch(NamedTuple):
     # what the shield remembers; where there is none, N = 0
     past: Past | None  # with `World.frames`
     crossings: np.ndarray | None  # `[E, N]` CROSSING, with `World.ways`
+    rides: np.ndarray  # `[E]` RIDE
 
 
 class Inputs(NamedTuple):
@@ -132,17 +135,17 @@ def _go_on(cars, episode, order, world, plans, watch, mode, flow):
 
 
 @rare
-def _restart(cars, episode, order, world, sight, distances, plans, watch, mode, step, out):
+def _restart(cars, episode, order, world, sight, distances, plans, ride, watch, mode, step, out):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
     _populate(cars, episode, order, world, sight, world.flow)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
     survey(cars, episode, world.network, sight, world.flow)
     sort_along_x(cars, episode.cars, order)
-    start_watch(episode, distances, plans, watch)
+    start_watch(episode, distances, plans, ride, watch)
     start_tally(step)
     step.raw_reward = rate(cars, episode, NO_ACTION, lanes, sight, config, step)
-    _report(cars, episode, mode, 0.0, step)
+    _report(cars, episode, ride, mode, 0.0, step)
     _see_apart(cars, episode, world, sight, out)
 
 
@@ -169,7 +172,7 @@ def _see_apart(cars, episode, world, sight, out):
 
 
 @compiled
-def _report(cars, episode, mode, cost, step):
+def _report(cars, episode, ride, mode, cost, step):
     """Fill in what every step says."""
     ego = cars[episode.ego]
     step.speed, step.crashed, step.time = ego.speed, ego.crashed, episode.time
@@ -177,7 +180,13 @@ def _report(cars, episode, mode, cost, step):
     if mode != OFF:
         episode.cost += cost
         step.cost, step.episode_cost = cost, episode.cost
-        step.override_share = episode.frames_overridden / max(episode.frames, 1)
+        frames = max(episode.frames, 1)
+        step.override_share = episode.frames_overridden / frames
+        step.anticipation_share = episode.frames_anticipated / frames
+        step.limited_share = episode.frames_limited / frames
+        step.mean_acceleration_change = episode.acceleration_changed / frames
+        step.mean_steering_change = episode.steering_changed / frames
+        report_comfort(ride, step)
         step.episode_dangerous_pairs = episode.dangerous_pairs
         step.episode_broken_duties = episode.broken_duties
         step.min_ttc = min(episode.min_ttc, _LONGEST_TTC)
@@ -188,7 +197,7 @@ def _report(cars, episode, mode, cost, step):
 
 
 @unfolded
-def _advance(e, cars, episode, order, world, sight, distances, plans, watch, settings, mode, inputs, film, step):
+def _advance(e, cars, episode, order, world, sight, distances, plans, ride, watch, settings, mode, inputs, film, step):
     """One decision of one environment, frame by frame."""
     config, net, flow = world.config[0], world.network, world.flow
     lanes = net.lanes
@@ -203,7 +212,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, watch, set
                 before = ego.target_lane
                 take_meta_action(cars, episode.ego, label, net, lanes, sight, world.target_speeds)
                 if mode != OFF:
-                    refuse_lane_change(before, cars, episode, sight, plans, settings)
+                    refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, settings, step)
             else:
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
@@ -214,7 +223,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, watch, set
         while first < episode.vehicles:  # a loop, lest the kernel contain it twice
             changing = think(cars, episode, first, last, changing, net, sight, config)
             if first == 0 and mode != OFF:
-                watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step)
+                watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, settings, step)
             first, last = last, episode.vehicles
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
@@ -231,42 +240,43 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, watch, set
 
 
 @kernel
-def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings, mode, penalty, autoreset):
+def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings, mode, penalty, by_change, autoreset):
     """One decision of the environments `first` to `last` - 1, resets included."""
     config, lanes = world.config[0], world.network.lanes
     for e in range(first, last):
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
         distances, plans = distances_of(e, world.frames, batch.past), plans_of(e, world.ways, batch.crossings)
-        observation = outputs.observations[e]
+        observation, ride = outputs.observations[e], batch.rides[e]
         outputs.rewards[e] = 0.0
         outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
             survey(cars, episode, world.network, sight, world.flow)
             _see_apart(cars, episode, world, sight, observation)
-            _report(cars, episode, mode, 0.0, step)
+            _report(cars, episode, ride, mode, 0.0, step)
             continue
         if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
-            _restart(cars, episode, order, world, sight, distances, plans, watch, mode, step, observation)
+            _restart(cars, episode, order, world, sight, distances, plans, ride, watch, mode, step, observation)
             continue
         cost = _advance(
-            e, cars, episode, order, world, sight, distances, plans, watch, settings, mode, inputs, film, step
+            e, cars, episode, order, world, sight, distances, plans, ride, watch, settings, mode, inputs, film, step
         )
         _see(cars, episode, world, sight, observation)
         reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
         step.raw_reward = reward
-        reward -= penalty * step.overridden / max(step.frames, 1)
+        charged = step.acceleration_changed if by_change else float(step.overridden)
+        reward -= penalty * (charged / max(step.frames, 1))
         episode.return_ += reward
         outputs.rewards[e] = reward
         outputs.terminated[e] = is_terminated(cars, episode, lanes, sight, config)
         outputs.truncated[e] = is_truncated(episode, config)
         episode.ended = outputs.terminated[e] or outputs.truncated[e]
-        _report(cars, episode, mode, cost, step)
+        _report(cars, episode, ride, mode, cost, step)
         _go_on(cars, episode, order, world, plans, watch, mode, world.flow)
         if episode.ended and autoreset == SAME_STEP:
             for k in range(len(observation)):
                 outputs.final_observations[e, k] = observation[k]
             outputs.final_steps[e] = step
-            _restart(cars, episode, order, world, sight, distances, plans, watch, mode, step, observation)
+            _restart(cars, episode, order, world, sight, distances, plans, ride, watch, mode, step, observation)
 
 
 class Engine:
@@ -279,6 +289,7 @@ class Engine:
       penalty: subtracted from the reward, times the share of frames that the shield overrode.
       autoreset: DISABLED, SAME_STEP or NEXT_STEP.
       threads: how many threads share the work.
+      by_change: the penalty is times the mean change of acceleration instead [m/s^2].
     """
 
     def __init__(
@@ -289,13 +300,14 @@ class Engine:
         penalty: float = 0.0,
         autoreset: int = SAME_STEP,
         threads: int = 1,
+        by_change: bool = False,
     ) -> None:
         n = scenario.capacity
         self.scenario = scenario
         self.num_envs = num_envs
         self.autoreset = autoreset
         self.mode = OFF if settings is None else OVERRIDE if settings.overrides else MONITOR
-        self.penalty = float(penalty)
+        self.penalty, self.by_change = float(penalty), bool(by_change)
         self.settings = settings or Settings(*PRESETS["simulator"][:2], Rules(), False, 1.0)
         network, net = scenario.stock.road.network, scenario.network
         watched = n if settings else 0
@@ -325,6 +337,7 @@ class Engine:
             np.zeros((num_envs, n), np.int64),
             past,
             crossings,
+            np.zeros(num_envs, RIDE),
         )
         self.film = Film(np.full(num_envs, -1, np.int64), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
         self._seen: np.ndarray | None = None  # last observations
@@ -381,7 +394,7 @@ class Engine:
             np.zeros((e, self._size), np.float32),
             np.zeros(e, STEP),
         )
-        rules = (self.settings, self.mode, self.penalty, self.autoreset)
+        rules = (self.settings, self.mode, self.penalty, self.by_change, self.autoreset)
         common = (self.world, self.batch, inputs, outputs, self.film, self._watch, *rules)
         if self._kernel is None:
             self._kernel = _specialise(self._sights[0], *common)

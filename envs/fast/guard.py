@@ -19,12 +19,14 @@ from envs.highway import MAX_SLIP
 from envs.intent import Junction, Roads, drift_of, is_outside, list_threats, no_roads, track_of
 from envs.junction_ego import junction_of
 from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
+from shield.comfort import comfort_of, ride_on
 from shield.command import Command
 from shield.compiled import rare
 from shield.controller import Body, Response, find_danger, respond
 from shield.geometry import largest_half_extents
 from shield.held_back import held_by
 from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame
+from shield.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from shield.plans import Scene
 from shield.response import MEMORY, catch_up
 
@@ -107,17 +109,20 @@ def plans_of(e, ways, crossings):
 
 
 @rare
-def start_watch(episode, distances, plans, watch):
+def start_watch(episode, distances, plans, ride, watch):
     """Forget everything at the start of an episode."""
     if distances is not None:
         start_past(episode, distances.past, watch.blank)
     if plans is not None:
         for i in range(len(plans.crossings)):
             plans.crossings[i] = watch.blank_crossing[0]
+    start_ride(ride)
+    episode.room_left = episode.room_right = np.inf
     episode.path, episode.go, episode.frames_trapped = -1, -1, 0
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
-    episode.frames = episode.frames_overridden = 0
+    episode.frames = episode.frames_overridden = episode.frames_anticipated = episode.frames_limited = 0
+    episode.acceleration_changed = episode.steering_changed = 0.0
     episode.dangerous_pairs = episode.broken_duties = 0
     episode.cost = 0.0
     episode.min_ttc = np.inf
@@ -143,14 +148,16 @@ def carry_over(episode, cars, crossings, ego, watch):
 @merged
 def start_tally(step):
     """Nothing has happened in this decision yet."""
-    step.frames = step.overridden = step.limited = step.dangerous_pairs = step.broken_duties = 0
-    step.acceleration_change = step.steering_change = 0.0
+    step.frames = step.overridden = step.anticipated = step.limited = 0
+    step.dangerous_pairs = step.broken_duties = 0
+    step.acceleration_change = step.steering_change = step.acceleration_changed = step.steering_changed = 0.0
+    step.lane_change_refused = False
     step.margin_lon = step.margin_lat = np.inf
     step.partner, step.response = -1, 0
 
 
 @merged
-def watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, step):
+def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, settings, step):
     """Restrict the ego's command on one frame, unless it has had its contact.
 
     Args:
@@ -159,6 +166,7 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, 
       lanes: `[L]` LANE.
       sight: this frame's.
       distances, plans: `Distances` or `Plans`; the other is None.
+      ride: RIDE.
       watch: `Watch`.
       settings: `envs.highway.Settings`.
       step: STEP, the tally is kept there.
@@ -167,8 +175,12 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, watch, settings, 
         return
     if plans is not None:
         _keep_plan(cars, episode, sight, plans, settings, step)
+        gap = np.inf
     if distances is not None:
         _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step)
+        gap = sight.z[0]
+    ego = cars[episode.ego]
+    ride_on(ride, ego.speed, ego.heading, gap, settings.dt)
 
 
 @merged
@@ -198,26 +210,27 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         nearest,
         soonest,
     )
+    episode.room_left, episode.room_right = danger.room_left, danger.room_right
     slip = 0.0  # which nobody asks about where nothing is to be changed or judged
     if steering != 0.0 and (settings.overrides or danger.dangerous):
         slip = arctan(0.5 * tan(steering))
     wish = Command(acceleration, slip)
-    response = Response(wish, False, False)
+    response = Response(wish, False, False, False)
     if settings.overrides:
         body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack, car.kind == DIRECT)
-        response = respond(wish, danger, ego, body, settings.rules, settings.dt)
+        wanted = _take_back(wish, car, ego, episode, lanes, sight, body, settings, step)
+        response = respond(wanted, danger, ego, body, settings.rules, settings.dt)
         command, steered = response.command, steering
         if command.slip != wish.slip:
             steered = arctan(2.0 * tan(command.slip))
         car.acceleration, car.steering = command.acceleration, steered
-        step.acceleration_change = max(step.acceleration_change, abs(command.acceleration - acceleration))
-        step.steering_change = max(step.steering_change, abs(steered - steering))
+        _count_change(episode, step, abs(command.acceleration - acceleration), abs(steered - steering))
     pairs = broken = 0
     if danger.dangerous:
         pairs, broken = judge_frame(
             ego, users, memory, response.command, bend.curvature, settings.ego, settings.other, settings.dt, who
         )
-    _count(episode, step, danger, response, pairs, broken, settings.overrides)
+    _count(episode, step, danger, response, response.anticipated, pairs, broken, settings.overrides)
     if danger.partner >= 0:
         step.margin_lon, step.margin_lat = danger.margin_lon, danger.margin_lat
         step.partner = car_of(danger.partner, episode)
@@ -243,22 +256,27 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
         if report.overridden and step.partner < 0:
             held = held_by(scene, car.acceleration, n, not settings.waits_anywhere)
             step.partner = car_of(held, episode) if held >= 0 else -1
-        step.acceleration_change = max(step.acceleration_change, abs(report.acceleration - car.acceleration))
+        _count_change(episode, step, abs(report.acceleration - car.acceleration), 0.0)
         car.acceleration = report.acceleration
-    _count(episode, step, report, report, report.pairs, report.broken, settings.overrides)
+    _count(episode, step, report, report, False, report.pairs, report.broken, settings.overrides)
     episode.frames_trapped += report.trapped
     episode.pairs_examined += report.examined
     episode.pairs_possible += report.possible
 
 
 @merged
-def _count(episode, step, danger, response, pairs, broken, overrides):
+def _count(episode, step, danger, response, anticipated, pairs, broken, overrides):
     """Take what happened on one frame into the tally."""
     overridden = (response.overridden or episode.refused) and overrides
+    limited = response.limited and not overridden and overrides
+    step.lane_change_refused = step.lane_change_refused or episode.refused
     episode.refused = False
     step.frames += 1
     step.overridden += overridden
-    step.limited += response.limited and not overridden and overrides
+    step.anticipated += anticipated and overrides
+    step.limited += limited
+    episode.frames_anticipated += anticipated and overrides
+    episode.frames_limited += limited
     step.dangerous_pairs += pairs
     step.broken_duties += broken
     step.response |= danger.response
@@ -270,11 +288,104 @@ def _count(episode, step, danger, response, pairs, broken, overrides):
 
 
 @merged
-def refuse_lane_change(before, cars, episode, sight, plans, settings):
-    """Take back a lane change of this decision that leaves no plan; `before` is the lane the ego headed for."""
+def _count_change(episode, step, acceleration, steering):
+    """Take the sizes of what was changed on one frame into the tally [m/s^2], [rad]."""
+    step.acceleration_change = max(step.acceleration_change, acceleration)
+    step.steering_change = max(step.steering_change, steering)
+    step.acceleration_changed += acceleration
+    step.steering_changed += steering
+    episode.acceleration_changed += acceleration
+    episode.steering_changed += steering
+
+
+@merged
+def start_ride(ride):
+    """Forget how the ride felt."""
+    ride.samples = ride.uncomfortable = ride.hard = ride.brakings = ride.gaps = 0
+    ride.distance = ride.least_gap = ride.sum_of_gaps = 0.0
+    for quantity in range(len(ride.squares)):
+        ride.squares[quantity] = 0.0
+        ride.bin[quantity] = ride.above[quantity] = 0
+        for b in range(ride.counts.shape[1]):
+            ride.counts[quantity, b] = 0
+
+
+@compiled
+def report_comfort(ride, step):
+    """Fill in how the ride has felt so far."""
+    for k, value in enumerate(comfort_of(ride)):
+        step.comfort[k] = value
+
+
+# ---------------------------------------------------------------- lane changes
+
+
+@merged
+def refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, settings, step):
+    """Ignore a lane change of this decision that leaves no plan, is blocked, or comes half-way through another.
+
+    `before` is the lane the ego headed for.
+    """
     episode.refused = False
     if plans is not None:
         _refuse_lane_change(before, cars, episode, sight, plans, settings)
+    if distances is not None:
+        _refuse_blocked(before, cars, episode, lanes, sight, settings, step)
+
+
+@compiled
+def _refuse_blocked(before, cars, episode, lanes, sight, settings, step):
+    ego = cars[episode.ego]
+    if not settings.overrides or not settings.rules.take_back or episode.blame != 0 or ego.kind != META:
+        return
+    k = ego.target_lane
+    if k == before or lanes[k].road != lanes[before].road:
+        return
+    offsets = sight.lateral[ego.lane, episode.ego], sight.lateral[before, episode.ego]
+    if turns_back(*offsets, k - before) or _is_blocked(k, episode, sight):
+        ego.target_lane = before
+        step.lane_change_refused = True
+
+
+@merged
+def _is_blocked(k, episode, sight):
+    """Is the way to the centre of lane `k` blocked?"""
+    return is_blocked(sight.lateral[k, episode.ego], episode.room_left, episode.room_right)
+
+
+@merged
+def _take_back(wish, car, ego, episode, lanes, sight, body, settings, step):
+    """`envs.highway.ShieldedEgo._taken_back`: what the agent wants, and the lane that it heads for from now on."""
+    slip = wish.slip
+    if settings.rules.take_back and car.kind == DIRECT:
+        rooms = episode.room_left, episode.room_right
+        width = lanes[car.lane].width
+        slip = lead_back(slip, ego, width, *rooms, body.half_wheelbase, body.curvature, settings.dt)
+    if settings.rules.take_back and car.kind == META:
+        lane = _reachable(car.lane, car.target_lane, episode, lanes, sight)
+        step.lane_change_refused = step.lane_change_refused or lane != car.target_lane
+        car.target_lane = lane
+    step.lane_change_refused = step.lane_change_refused or slip != wish.slip
+    return Command(wish.acceleration, slip)
+
+
+@compiled
+def _reachable(here, target, episode, lanes, sight):
+    """Lane that the ego can get to: its target, one on the way, the one it is on, or the one it has come from."""
+    if lanes[target].road != lanes[here].road:
+        return target
+    for k in range(target, here, 1 if here > target else -1):
+        if not _is_blocked(k, episode, sight):
+            return k
+    if target != here or not _is_blocked(here, episode, sight):
+        return here
+    lateral = sight.lateral[here, episode.ego]
+    if abs(lateral) <= OFF_CENTRE:
+        return target
+    step = 1 if lateral > 0.0 else -1
+    if not 0 <= lanes[here].id + step < lanes[here].siblings or _is_blocked(here + step, episode, sight):
+        return target
+    return here + step
 
 
 @compiled

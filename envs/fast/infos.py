@@ -10,6 +10,7 @@ from envs.fast.config import EXIT, INTERSECTION, Scenario
 from envs.highway import AXES, Settings, response_name
 from envs.junction_ego import PLAN_NAMES
 from shield.blame import DUTIES, VERDICTS
+from shield.comfort import Comfort
 
 
 def _names(texts) -> np.ndarray:
@@ -64,9 +65,13 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
         "shield": {
             "intervened": steps["overridden"] > 0,
             "override_fraction": steps["overridden"] / frames,
+            "anticipation_fraction": steps["anticipated"] / frames,
             "limited_fraction": steps["limited"] / frames,
             "acceleration_change": steps["acceleration_change"],
             "steering_change": steps["steering_change"],
+            "mean_acceleration_change": steps["acceleration_changed"] / frames,
+            "mean_steering_change": steps["steering_changed"] / frames,
+            "lane_change_refused": steps["lane_change_refused"],
             "dangerous": steps["dangerous_pairs"] > 0,
             "dangerous_pairs": steps["dangerous_pairs"],
             "broken_duties": steps["broken_duties"],
@@ -89,10 +94,15 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
             "other_excess": steps["other_excess"],
         },
         "override_share": steps["override_share"],
+        "anticipation_share": steps["anticipation_share"],
+        "limited_share": steps["limited_share"],
+        "mean_acceleration_change": steps["mean_acceleration_change"],
+        "mean_steering_change": steps["mean_steering_change"],
         "episode_cost": steps["episode_cost"],
         "episode_dangerous_pairs": steps["episode_dangerous_pairs"],
         "episode_broken_duties": steps["episode_broken_duties"],
         "min_ttc": steps["min_ttc"],
+        **{name: steps["comfort"][:, k] for k, name in enumerate(Comfort._fields)},
         "raw_reward": steps["raw_reward"],
     }
 

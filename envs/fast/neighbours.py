@@ -14,8 +14,9 @@ from envs.fast.network import heading_at
 from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
 from envs.highway import Settings
 from envs.roads import reach_of, road_through
+from shield.comfort import gap_in_way
 from shield.compiled import rare
-from shield.controller import beyond_doubt, may_be_next
+from shield.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
 from shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
 from shield.lane_frame import look_ahead, same_frame, to_lane_frame
 from shield.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
@@ -144,7 +145,8 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     _note(ego, now[episode.ego])
     _to_record(road, now[episode.ego], before[episode.ego], boxes[0], dt, me)
     me.wreck, me.in_own_lane = False, True
-    threshold = _look_over(cars, episode, ego, me, road, now, sight.x, settings, soonest)
+    sight.z[0] = np.inf  # gap ahead
+    threshold = _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest)
     if not chosen:
         far = beyond_doubt(me.speed, settings.ego, dt)
         _choose_near(episode, past, sight.x, max(min(threshold, nearest), far) + _ROUNDING)
@@ -156,9 +158,17 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
         _to_record(road, pose, before[k], box, dt, user)
         pose.in_own_lane = _in_own_lane(k, car, ego, lanes, sight)
         user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
+        if not is_straight(road):
+            _note_gap(user.s - me.s, user.y - me.y, box, boxes[0], sight)
         if past.memory[i].skipped:
             _make_up(road_before, before[k], earlier[k], box, dt, sight.users_before[i])
     return look_ahead(road, ego.x, ego.y, ego.speed, ego.length / 2, dt)
+
+
+@merged
+def _note_gap(along, across, box, own, sight):
+    """Keep the smallest gap ahead in `sight.z[0]` [m]; `box`, `own`: length and width of the two."""
+    sight.z[0] = min(sight.z[0], gap_in_way(along, across, own[0] + box[0], own[1] + box[1]))
 
 
 @rare
@@ -214,20 +224,21 @@ def _to_record(road, pose, before, box, dt, user):
 
 
 @merged
-def _look_over(cars, episode, ego, me, road, now, bounds, settings, soonest):
-    """Note where everybody is, and bound the longitudinal margin of each from below [m].
+def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest):
+    """Note where everybody is, and bound the longitudinal margin of each from below in `sight.x` [m].
 
     Where the bound is -inf nothing is known, or the time to collision may be the shortest.
 
     Returns:
       A margin [m] that the nearest of all has at most: no required distance is negative.
     """
-    straight = is_straight(road)
+    straight, bounds = is_straight(road), sight.x
     cos, sin = road[0, COS], road[0, SIN]
     share = own_share(me.speed, me.cos, settings.ego, settings.dt)
     lead, least_cos = leading_speed(me, settings.rules), least_cosine(settings.rules)
     half_lengths, half_widths = me.half_length + _HALF_DIAGONAL, me.half_width + _HALF_DIAGONAL
     nearest = np.inf
+    look = look_ahead_of(me, settings.ego, settings.other, settings.rules, settings.dt)
     for i in range(episode.cars - 1):
         k = car_of(i, episode)
         car, pose = cars[k], now[k]
@@ -255,7 +266,13 @@ def _look_over(cars, episode, ego, me, road, now, bounds, settings, soonest):
         gap_lon, gap_lat = along - half_lengths - _ROUNDING, abs(across) - half_widths
         is_next = may_be_next(along >= 0.0, gap_lon, gap_lat, closing, soonest)
         oncoming = car.cos * ego.cos + car.sin * ego.sin <= 0.0
-        bounds[i] = -np.inf if is_next or oncoming else bound
+        was = before[k]
+        drifts = car.sin * cos != car.cos * sin or (car.y - was.y) * cos != (car.x - was.x) * sin
+        _note_gap(along, across, boxes[1 if car.kind == OBSTACLE else 0], boxes[0], sight)
+        own_half = boxes[1 if car.kind == OBSTACLE else 0, 3]  # of one that does not drift
+        gap_lat = abs(across) - me.half_width - own_half - _ROUNDING
+        binds = may_bind(along >= 0.0, bound, gap_lat, drifts, car.speed, look)
+        bounds[i] = -np.inf if is_next or oncoming or binds else bound
         nearest = min(nearest, max(abs(along), abs(across)))
     return nearest
 

@@ -7,6 +7,7 @@ structured arrays are arrays: `cars["x"]` is `[E, N]`.
 import numpy as np
 
 from envs.fast.draws import GENERATOR
+from shield.comfort import Comfort
 
 # kinds of road users
 TRAFFIC = 0  # `IDMVehicle`
@@ -77,6 +78,12 @@ EPISODE = np.dtype(
         ("nominal_steering", "f8"),
         ("frames", "i8"),  # watched since reset
         ("frames_overridden", "i8"),
+        ("frames_anticipated", "i8"),
+        ("frames_limited", "i8"),
+        ("acceleration_changed", "f8"),  # sums of the sizes of changes [m/s^2]
+        ("steering_changed", "f8"),  # [rad]
+        ("room_left", "f8"),  # beside who was alongside on the last frame [m]
+        ("room_right", "f8"),
         ("dangerous_pairs", "i8"),
         ("broken_duties", "i8"),
         ("cost", "f8"),
@@ -106,17 +113,26 @@ STEP = np.dtype(
         # what the shield saw and did
         ("frames", "i8"),
         ("overridden", "i8"),
+        ("anticipated", "i8"),
         ("limited", "i8"),
         ("dangerous_pairs", "i8"),
         ("broken_duties", "i8"),
-        ("acceleration_change", "f8"),
+        ("acceleration_change", "f8"),  # largest
         ("steering_change", "f8"),
+        ("acceleration_changed", "f8"),  # sums
+        ("steering_changed", "f8"),
+        ("lane_change_refused", "?"),
         ("margin_lon", "f8"),
         ("margin_lat", "f8"),
         ("partner", "i8"),
         ("response", "i8"),
         ("cost", "f8"),
         ("override_share", "f8"),
+        ("anticipation_share", "f8"),
+        ("limited_share", "f8"),
+        ("mean_acceleration_change", "f8"),
+        ("mean_steering_change", "f8"),
+        ("comfort", "f8", (len(Comfort._fields),)),
         ("episode_cost", "f8"),
         ("episode_dangerous_pairs", "i8"),
         ("episode_broken_duties", "i8"),

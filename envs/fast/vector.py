@@ -49,7 +49,8 @@ class FastVectorEnv(VectorEnv):
       scenario: what to run.
       num_envs: E.
       settings: of the shield, None = no shield.
-      intervention_penalty: subtracted from the reward, times the step's override fraction.
+      intervention_penalty: subtracted from the reward, times the step's override fraction, or
+      penalty_by_change: its mean change of acceleration.
       autoreset_mode: see above.
       threads: threads that share the work. Results do not depend on it.
     """
@@ -64,6 +65,7 @@ class FastVectorEnv(VectorEnv):
         intervention_penalty: float = 0.0,
         autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
         threads: int = 1,
+        penalty_by_change: bool = False,
     ) -> None:
         self.scenario = scenario
         self.settings = settings
@@ -73,7 +75,8 @@ class FastVectorEnv(VectorEnv):
         self.observation_space = batch_space(scenario.observation_space, num_envs)
         self.action_space = batch_space(scenario.action_space, num_envs)
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
-        self.engine = Engine(scenario, num_envs, settings, intervention_penalty, _MODES[autoreset_mode], threads)
+        mode = _MODES[autoreset_mode]
+        self.engine = Engine(scenario, num_envs, settings, intervention_penalty, mode, threads, penalty_by_change)
         self.recording = Recording(self.engine)
         self._everywhere = np.ones(num_envs, bool)
         self._decided = np.zeros(num_envs, bool)  # not where the last call began an episode

@@ -99,7 +99,7 @@ def play(env_id, rules, scenes, measured_up_to=None):
     engine.reset()
     lanes, rng = engine.world.network.lanes, np.random.default_rng(0)
     cars = engine.batch.cars[0][: engine.batch.episodes["cars"][0]]
-    different, shares = 0, []
+    different, anticipated, shares = 0, 0, []
     for _ in range(scenes):
         scatter(cars, lanes, rng)
         thorough, quick = Shield(engine, settings), Shield(engine, settings)
@@ -110,6 +110,7 @@ def play(env_id, rules, scenes, measured_up_to=None):
             full, _ = thorough.look(True, nearest, nearest, soonest)
             found, count = quick.look(False, nearest if measured_up_to is None else measured_up_to, nearest, soonest)
             same = found == full
+            anticipated += full.eased != full.bounds
             since = quick.past.memory["since"] == thorough.past.memory["since"]
             in_danger = thorough.past.memory["since"] > 0
             for field in set(MEMORY.names) - {"age"}:
@@ -119,10 +120,11 @@ def play(env_id, rules, scenes, measured_up_to=None):
             nearest, soonest = min(nearest, max(full.margin_lon, full.margin_lat)), full.ttc
             move(cars, lanes, rng)
     engine.close()
+    assert (anticipated > 0) == (rules.anticipation > 0.0)
     return different, np.array(shares)
 
 
-@pytest.mark.parametrize("rules", [Rules(), Rules(heading_bound=1.0)])
+@pytest.mark.parametrize("rules", [Rules(), Rules(heading_bound=1.0), Rules(anticipation=0.0)])
 def test_measuring_the_near_ones_comes_to_the_same_as_measuring_everybody(rules):
     different, shares = play("highway-fast-v0", rules, 150)
     assert different == 0
@@ -135,5 +137,5 @@ def test_on_winding_roads_everybody_is_measured():
 
 
 def test_measuring_too_few_would_be_noticed():
-    different, _ = play("highway-fast-v0", Rules(), 30, measured_up_to=-np.inf)
+    different, _ = play("highway-fast-v0", Rules(anticipation=0.0), 30, measured_up_to=-np.inf)
     assert different > 0

@@ -8,6 +8,7 @@ import envs
 from envs.fast.config import Unsupported, compile_scenario
 from envs.fast.drivers import SLOWER
 from envs.stock import LONGEST_EPISODE
+from shield.params import Rules
 
 ENV = "highway-fast-v0"
 
@@ -153,7 +154,7 @@ def test_unknown_names_are_errors():
 
 def test_an_intervention_penalty_is_taken_from_the_reward():
     def total(penalty):
-        env = envs.make_vec(ENV, 4, intervention_penalty=penalty)
+        env = envs.make_vec(ENV, 4, intervention_penalty=penalty, rules=Rules(anticipation=0.0))
         env.reset(seed=0)
         rewards, fractions = 0.0, 0.0
         for _ in range(3):
@@ -165,6 +166,19 @@ def test_an_intervention_penalty_is_taken_from_the_reward():
     paid, _ = total(0.5)
     assert fractions.max() > 0
     np.testing.assert_allclose(bare - paid, 0.5 * fractions)
+
+
+@pytest.mark.parametrize("backend", ["fast", "highway-env"])
+def test_a_penalty_may_be_charged_by_the_size_of_the_change(backend):
+    def reward(penalty):
+        env = envs.make_vec(ENV, 2, intervention_penalty=penalty, penalty_on="change", backend=backend)
+        env.reset(seed=0)
+        return env.step(np.full(2, 3))
+
+    _, bare, *_, infos = reward(0.0)
+    _, paid, *_ = reward(0.25)
+    assert infos["shield"]["mean_acceleration_change"].max() > 0
+    np.testing.assert_allclose(bare - paid, 0.25 * infos["shield"]["mean_acceleration_change"])
 
 
 @pytest.mark.parametrize("name", ["num_envs", "threads"])

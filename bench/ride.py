@@ -1,0 +1,402 @@
+"""How a ride behind the shield feels: without and with anticipation, beside highway-env's own driver.
+
+    python bench/ride.py                          every road and driver, tables and docs/ride.png, in minutes
+    python bench/ride.py --write                  ... and docs/ride.md
+    python bench/ride.py --envs highway-fast-v0 --episodes 1000
+
+Drivers are FASTER, IDLE and random actions behind the shield; "monitor" is the same random driver without it, "IDM" is
+highway-env's own driver in place of the ego. All play the same seeds.
+"""
+
+import dataclasses
+import functools
+import sys
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import matplotlib
+import numpy as np
+import pandas as pd
+import tyro
+from gymnasium.vector import AutoresetMode
+from highway_env.road.road import Road, RoadNetwork
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.controller import MDPVehicle
+from highway_env.vehicle.kinematics import Vehicle
+
+from envs import ShieldWrapper, make, make_vec
+from envs.fast.config import Unsupported
+from envs.highway import Settings, ShieldedEgo
+from envs.stock import make_stock
+from eval.files import write_text
+from eval.rollout import evaluate, run_episode
+from eval.stats import paired_difference
+from shield.kinematics import frames_for
+from shield.pair import assess
+from shield.params import PRESETS, Rules
+
+ROADS = (
+    *("highway-fast-v0", "highway-v0", "merge-v0", "merge-v1", "exit-v0", "two-way-v0", "u-turn-v0"),
+    *("roundabout-v0", "intersection-v0"),
+)
+DRIVERS = ("faster", "idle", "random")
+BEFORE, AFTER = "before", "after"
+RULES = {BEFORE: Rules(anticipation=0.0, take_back=False), AFTER: Rules()}
+LEFT, IDLE, RIGHT, FASTER = range(4)
+FIRST_SEED = 800_000
+PAGE, PLOT = Path("docs/ride.md"), Path("docs/ride.png")
+HEADER = """# How a ride behind the shield feels
+
+Written by `python bench/ride.py --write`. Before: without anticipation and with lane changes that are not taken back
+(`Rules(anticipation=0.0, take_back=False)`). After: the default.
+
+![Behind one leader](ride.png)
+"""
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """Measure how a ride feels."""
+
+    envs: tuple[str, ...] = ROADS
+    episodes: int = 300  # per road, driver and shield
+    idm_episodes: int = 30  # of highway-env's own driver
+    lane_changes: int = 300  # episodes of random lane changes
+    threads: int = 2
+    write: bool = False  # docs/ride.md and docs/ride.png
+
+
+class IdmEgo(gym.Wrapper):
+    """highway-env's own driver takes the place of the ego; actions change nothing."""
+
+    def reset(self, *, seed=None, options=None):
+        observation, info = self.env.reset(seed=seed, options=options)
+        env: Any = self.env.unwrapped
+        stock = env.vehicle
+        driver = IDMVehicle.create_from(stock)
+        driver.route, driver.target_speed = stock.route, 30.0
+        driver.target_speeds, driver.speed_index = stock.target_speeds, stock.speed_index  # some rewards ask for them
+        env.road.vehicles[env.road.vehicles.index(stock)] = driver
+        env.controlled_vehicles = [driver]
+        env.action_type.controlled_vehicle = driver
+        env.observation_type.observer_vehicle = driver
+        return observation, info
+
+
+# ---------------------------------------------------------------- episodes
+
+
+def act(driver: str, rng: np.random.Generator, n: int, actions: int) -> np.ndarray:
+    """The next actions of a driver in n environments that have so many meta-actions."""
+    if driver == "random":
+        return rng.integers(actions, size=n)
+    if driver == "lanes":
+        return np.where(rng.random(n) < 0.5, LEFT, RIGHT)
+    return np.full(n, {"faster": FASTER, "idle": IDLE}[driver] - (0 if actions == 5 else (driver == "faster")))
+
+
+def play(env_id: str, driver: str, mode: str, rules: Rules, episodes: int, threads: int) -> pd.DataFrame:
+    """One row per episode, from the engine or, where it has no such road, from highway-env."""
+    seeds, rng = range(FIRST_SEED, FIRST_SEED + episodes), np.random.default_rng(0)
+    options: dict[str, Any] = {"rules": rules, "intent": "known"}
+    actions = 3 if "intersection" in env_id else 5
+
+    def batch(n: int) -> Any:
+        return make_vec(env_id, n, mode, autoreset_mode=AutoresetMode.DISABLED, threads=threads, **options)
+
+    try:
+        make_vec(env_id, 1, mode, **options).close()
+    except Unsupported:
+        few = range(FIRST_SEED, FIRST_SEED + min(episodes, 60))
+        rows = [
+            run_episode(lambda: make(env_id, mode, **options), lambda _: act(driver, rng, 1, actions)[0], s)
+            for s in few
+        ]
+        return pd.DataFrame(rows)
+    return evaluate(batch, lambda seen: act(driver, rng, len(seen), actions), seeds, n_envs=256, keep_actions=False)
+
+
+def play_idm(env_id: str, episodes: int) -> pd.DataFrame:
+    """The same of highway-env's own driver, watched."""
+    seeds = range(FIRST_SEED, FIRST_SEED + episodes)
+
+    def watched() -> gym.Env:
+        seen = {"observation": {"type": "Kinematics"}}  # others may ask for what only MDPVehicle has
+        return ShieldWrapper(IdmEgo(make_stock(env_id, config=seen)), mode="monitor")
+
+    return pd.DataFrame([run_episode(watched, lambda _: IDLE, seed) for seed in seeds])
+
+
+class Row(NamedTuple):
+    """One line of the table."""
+
+    driver: str
+    shield: str
+    n: int
+    ret: str
+    speed: str
+    rms_jerk: str
+    p99_jerk: str
+    hard: str
+    comfortable: str
+    response: str
+    anticipated: str
+    change: str
+    danger: str
+    fault: str
+
+
+HEADINGS = Row(
+    "driver",
+    "shield",
+    "n",  # type: ignore[arg-type]
+    "return",
+    "speed [m/s]",
+    "rms jerk [m/s³]",
+    "99 % jerk [m/s³]",
+    "a < -3 [% of frames]",
+    "comfortable [% of frames]",
+    "duty [% of frames]",
+    "anticipated [% of frames]",
+    "mean change [m/s²]",
+    "dangerous pair-frames per episode",
+    "ego at fault / none / broken duties",
+)
+
+
+def row(driver: str, shield: str, frame: pd.DataFrame) -> Row:
+    weight = frame["time"] / frame["time"].sum()
+
+    def share(name: str) -> float:
+        return float((frame[name] * weight).sum())
+
+    at_fault, none = frame["blame"].isin(["ego", "both"]).sum(), (frame["blame"] == "none").sum()
+    return Row(
+        driver,
+        shield,
+        len(frame),
+        f"{frame['return'].mean():.2f}",
+        f"{frame['speed'].mean():.1f}",
+        f"{np.sqrt((frame['rms_jerk'] ** 2 * weight).sum()):.1f}",
+        f"{share('p99_jerk'):.0f}",
+        f"{100 * share('hard_braking_share'):.1f}",
+        f"{100 * share('comfortable_share'):.0f}",
+        f"{100 * share('override_share'):.0f}",
+        f"{100 * share('anticipation_share'):.0f}",
+        f"{share('mean_acceleration_change'):.1f}",
+        f"{frame['dangerous_pairs'].mean():.1f}",
+        f"{at_fault} / {none} / {frame['broken_duties'].sum()}",
+    )
+
+
+def markdown(rows: list[Any]) -> str:
+    lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines) + "\n"
+
+
+def of_road(env_id: str, config: Config) -> str:
+    """The table of one road, and what anticipation did to the return."""
+    rows, notes = [HEADINGS], []
+    for driver in DRIVERS:
+        frames = {
+            name: play(env_id, driver, "override", rules, config.episodes, config.threads)
+            for name, rules in RULES.items()
+        }
+        rows += [row(driver.upper(), name, frame) for name, frame in frames.items()]
+        returns = frames[AFTER]["return"].to_numpy(), frames[BEFORE]["return"].to_numpy()
+        if driver != "random":  # random actions are not paired
+            d = paired_difference(*returns, np.random.default_rng(0))
+            notes.append(f"{driver.upper()}: {d.value:+.3f} [{d.low:+.3f}, {d.high:+.3f}]")
+    rows.append(row("RANDOM", "monitor", play(env_id, "random", "monitor", Rules(), config.episodes, config.threads)))
+    if config.idm_episodes:
+        rows.append(row("IDM", "monitor", play_idm(env_id, config.idm_episodes)))
+    difference = f"Return after minus before, paired, with its 95 % interval: {'; '.join(notes)}.\n"
+    return f"## {env_id}\n\n{markdown(rows)}\n{difference}"
+
+
+# ---------------------------------------------------------------- between two lanes
+
+
+def longest_off_centre(logs: list[Any], dt: float) -> np.ndarray:
+    """Longest stretch of each episode more than 1 m off the centre of a lane [s], on a road with lanes every 4 m."""
+    longest = []
+    for log in logs:
+        y = log.cars[:, 0]["y"]
+        off = np.abs((y + 2.0) % 4.0 - 2.0) > 1.0
+        run = best = 0
+        for is_off in off:
+            run = run + 1 if is_off else 0
+            best = max(best, run)
+        longest.append(best * dt)
+    return np.array(longest)
+
+
+def between_lanes(config: Config) -> str:
+    rows: list[Any] = [("actions", "shield", "n", "longest [s]", "episodes above 1.2 s", "mean of the longest [s]")]
+    for driver in ("lanes", "random"):
+        for name, mode, rules in (
+            ("none", "monitor", Rules()),
+            (BEFORE, "override", RULES[BEFORE]),
+            (AFTER, "override", Rules()),
+        ):
+            env = make_vec("highway-fast-v0", config.lane_changes, mode, rules=rules, threads=config.threads)
+            rng, n = np.random.default_rng(1), config.lane_changes
+            env.reset(seed=FIRST_SEED)
+            env.recording.choose(range(n))  # type: ignore[attr-defined]
+            for _ in range(30):
+                env.step(act(driver, rng, n, 5))
+            finished = {log.env: log for log in reversed(env.recording.finished)}  # type: ignore[attr-defined]
+            off = longest_off_centre(list(finished.values()), 0.2)
+            env.close()
+            rows.append(
+                (driver, name, len(off), f"{off.max():.1f}", int((off > 1.2 + 1e-9).sum()), f"{off.mean():.2f}")
+            )
+    text = "Longest stretch more than 1 m off the centre of every lane, highway-fast-v0 (frames of 0.2 s)."
+    return f"## Between two lanes\n\n{text}\n\n{markdown(rows)}"
+
+
+# ---------------------------------------------------------------- what it costs
+
+
+def on_highway_env(rules: Rules, seeds: range) -> float:
+    """Time of the shield per frame [µs], the measure of the ride included."""
+    spent = frames = 0.0
+    for seed in seeds:
+        env = make("highway-fast-v0", rules=rules)
+        env.reset(seed=seed)
+        ego: Any = env._ego  # type: ignore[attr-defined]
+        inner = ego._frame
+
+        def timed(inner=inner) -> None:
+            nonlocal spent, frames
+            begin = time.perf_counter()
+            inner()
+            spent += time.perf_counter() - begin
+            frames += 1
+
+        ego._frame = timed
+        done = False
+        while not done:
+            _, _, terminated, truncated, _ = env.step(FASTER)
+            done = terminated or truncated
+    return 1e6 * spent / frames
+
+
+def in_engine(shield: str | None, rules: Rules) -> float:
+    """Time per frame of the whole engine, one thread [µs]."""
+    env = make_vec("highway-fast-v0", 256, shield, rules=rules)
+    env.reset(seed=FIRST_SEED)
+    actions = np.full(256, FASTER)
+    env.step(actions)
+    begin = time.process_time()
+    for _ in range(20):
+        env.step(actions)
+    spent = time.process_time() - begin
+    env.close()
+    return 1e6 * spent / (20 * 256 * 5)
+
+
+def price() -> str:
+    runs: dict[str, list[float]] = {name: [] for name in (*RULES, "engine bare", *(f"engine {name}" for name in RULES))}
+    for k in range(5):
+        for name, rules in RULES.items():
+            runs[name].append(on_highway_env(rules, range(FIRST_SEED + 3 * k, FIRST_SEED + 3 * k + 3)))
+            runs[f"engine {name}"].append(in_engine("override", rules))
+        runs["engine bare"].append(in_engine(None, Rules()))
+    best = {name: float(np.min(times)) for name, times in runs.items()}
+    rows: list[Any] = [("where", BEFORE, AFTER)]
+    rows.append(("highway-env, shield per frame [µs]", *(f"{best[name]:.0f}" for name in RULES)))
+    rows.append(
+        ("engine, shield per frame [µs]", *(f"{best[f'engine {name}'] - best['engine bare']:.2f}" for name in RULES))
+    )
+    bare = f"{best['engine bare']:.2f} µs"
+    text = f"The least of five runs in turn, always FASTER on highway-fast-v0. The engine without a shield: {bare}."
+    return f"## What it costs\n\n{text}\n\n{markdown(rows)}"
+
+
+# ---------------------------------------------------------------- behind one leader
+
+
+def behind_a_leader(kind: str, dt: float = 1 / 15, seconds: float = 40.0) -> pd.DataFrame:
+    """Speed, acceleration, gap and required gap over time behind a leader that slows down and speeds up again."""
+    road = Road(RoadNetwork.straight_road_network(1, speed_limit=30, length=3000), np_random=np.random.default_rng(0))
+    ego = (IDMVehicle if kind == "IDM" else MDPVehicle)(road, [0.0, 0.0], heading=0.0, speed=25.0)
+    ego.target_speed = 30.0
+    leader = Vehicle(road, [70.0, 0.0], speed=22.0)
+    road.vehicles += [ego, leader]
+    preset, rules = PRESETS["simulator"], RULES.get(kind, Rules())
+    table = preset.ego._replace(response_time=float(frames_for(max(preset.ego.response_time, dt), dt) * dt))
+    other = preset.other._replace(response_time=float(frames_for(preset.other.response_time, dt) * dt))
+    shield = ShieldedEgo(ego, Settings(table, other, rules, kind != "IDM", dt), record=True)
+    for k in range(int(seconds / dt)):
+        t = k * dt
+        leader.action["acceleration"] = -3.0 if 10.0 <= t < 14.0 else 1.0 if 20.0 <= t < 32.0 else 0.0
+        road.act()
+        road.step(dt)
+    frames = shield.record or []
+    pairs = [assess(frame.ego, frame.users[0], table, other, rules, dt) for frame in frames]
+    speeds = np.array([frame.poses[-1, 3] for frame in frames])
+    return pd.DataFrame(
+        {
+            "t": np.arange(len(frames)) * dt,
+            "speed": speeds,
+            "leader": [frame.poses[0, 3] for frame in frames],
+            "acceleration": np.append(np.diff(speeds) / dt, np.nan),
+            "gap": [pair.gap_lon for pair in pairs],
+            "required": [pair.gap_lon - pair.margin_lon for pair in pairs],
+        }
+    )
+
+
+def plot(path: Path) -> None:
+    matplotlib.use("Agg")
+    from matplotlib.figure import Figure
+
+    kinds = ((BEFORE, "shield, no anticipation"), (AFTER, "shield, with anticipation"), ("IDM", "highway-env's driver"))
+    figure = Figure(figsize=(10, 6.4), layout="constrained")
+    grid = figure.subplots(3, 3, sharex=True, sharey="row")
+    for column, (kind, title) in enumerate(kinds):
+        rides = behind_a_leader(kind)
+        speed, acceleration, gap = grid[:, column]
+        speed.set_title(title, loc="left")
+        speed.plot(rides["t"], rides["leader"], color="0.6", label="leader")
+        speed.plot(rides["t"], rides["speed"], color="#0072B2", label="ego")
+        acceleration.plot(rides["t"], rides["acceleration"], color="#D55E00", lw=0.8)
+        gap.plot(rides["t"], rides["gap"], color="#0072B2", label="gap")
+        gap.plot(rides["t"], rides["required"], color="0.3", ls="--", label="required (Def. 1)")
+        gap.set_xlabel("time [s]")
+        jerk = np.diff(rides["acceleration"].dropna()) * 15
+        acceleration.text(
+            0.02, 0.04, f"rms jerk {np.sqrt(np.mean(jerk**2)):.1f} m/s³", transform=acceleration.transAxes
+        )
+    for axes, label in zip(grid[:, 0], ("speed [m/s]", "acceleration [m/s²]", "gap [m]"), strict=True):
+        axes.set_ylabel(label)
+    grid[0, 0].legend(frameon=False)
+    grid[2, 0].legend(frameon=False)
+    figure.savefig(path, dpi=130)
+
+
+def main(config: Config) -> int:
+    unknown = [env_id for env_id in config.envs if env_id not in ROADS]
+    if unknown:
+        print(f"envs = {unknown[0]!r}: expected some of {', '.join(ROADS)}", file=sys.stderr)
+        return 2
+    if config.write:
+        plot(PLOT)
+    parts = [HEADER]
+    for part in (
+        lambda: between_lanes(config),
+        price,
+        *(functools.partial(of_road, env, config) for env in config.envs),
+    ):
+        parts.append(part())
+        print(parts[-1], flush=True)
+        if config.write:
+            write_text(PAGE, "\n".join(parts))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(tyro.cli(Config, description=__doc__)))
