@@ -6,30 +6,12 @@ from typing import Any
 import numba
 
 from rss_shield.envs._numpy.blas import ROUNDING
-from rss_shield.shield._numba.compiled import APART, MERGED, PLAIN, also_outside, fingerprint, inner, only_inside
+from rss_shield.shield._numba.compiled import APART, PLAIN, also_outside, fingerprint
 
 _njit: Any = numba.njit  # its published types lack some options
 
 # What has one caller only becomes part of its source and is never compiled alone, which saves compile time.
 unfolded = _njit(**PLAIN, inline="always")
-
-
-def callable_too(function):
-    """What Python calls as well, outside the loops."""
-    return also_outside(function, **PLAIN, **MERGED)
-
-
-def compiled(function):
-    """An inner function. It becomes a part of the kernel, which alone is cached, and is nothing to Python.
-
-    Where it is large or called from several places, it stays a function of its own there.
-    """
-    return only_inside(function, **PLAIN, **APART)
-
-
-# An inner function merged into its callers: calls hand over tuples of arrays field by field, which may cost more
-# than the work.
-merged = inner
 
 
 def kernel(function):

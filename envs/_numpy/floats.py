@@ -7,7 +7,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rss_shield.envs._numpy.blas import FUSED_FIRST, FUSED_SECOND, ROUNDING
-from rss_shield.envs.compiled import merged
+from rss_shield.shield._numba.compiled import inner
 
 _intrinsic: Any = intrinsic
 
@@ -23,7 +23,7 @@ def _fma(typing_context, a, b, c):
     return signature, generate
 
 
-@merged
+@inner
 def dot(ax, ay, bx, by):
     """`np.dot` of two plane vectors, rounded as it is here: another rounding would differ in one of four."""
     if ROUNDING == FUSED_SECOND:
@@ -33,19 +33,19 @@ def dot(ax, ay, bx, by):
     return ax * bx + ay * by
 
 
-@merged
+@inner
 def norm(x, y):
     """`np.linalg.norm` of a plane vector."""
     return np.sqrt(dot(x, y, x, y))
 
 
-@merged
+@inner
 def clip(x, low, high):
     """`np.clip` of a float."""
     return min(max(x, low), high)
 
 
-@merged
+@inner
 def wrap_to_pi(angle):
     """`highway_env.utils.wrap_to_pi`, without the division where the angle is in range already [rad]."""
     shifted = angle + np.pi
@@ -54,7 +54,7 @@ def wrap_to_pi(angle):
     return shifted - np.pi
 
 
-@merged
+@inner
 def not_zero(x):
     """`highway_env.utils.not_zero`: at least 0.01 away from zero."""
     if abs(x) > 1e-2:
@@ -62,7 +62,7 @@ def not_zero(x):
     return 1e-2 if x >= 0.0 else -1e-2
 
 
-@merged
+@inner
 def lmap(v, x0, x1, y0, y1):
     """`highway_env.utils.lmap`: linear map of [x0, x1] to [y0, y1]."""
     return y0 + (v - x0) * (y1 - y0) / (x1 - x0)

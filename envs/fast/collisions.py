@@ -3,14 +3,14 @@
 import numpy as np
 
 from rss_shield.envs._numpy.floats import dot, norm
-from rss_shield.envs.compiled import compiled, merged
 from rss_shield.envs.fast.state import OBSTACLE
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH
+from rss_shield.shield._numba.compiled import inner, part
 
 _LARGEST = np.hypot(CAR_LENGTH, CAR_WIDTH)  # diagonal of a road user [m]
 
 
-@merged
+@inner
 def collide(cars, episode, order, sight, dt):
     """Find all collisions of this frame, in the order of (first, second) index, and mark the cars.
 
@@ -49,7 +49,7 @@ def collide(cars, episode, order, sight, dt):
         _collide_pair(cars, sight.pairs[m] // n, sight.pairs[m] % n, sight.corners, dt)
 
 
-@merged
+@inner
 def _note_pair(cars, i, j, n, vehicles, found, reach, pairs, dt):
     """Add a pair to the `found` ones if the two are near each other; returns how many there are then."""
     if abs(cars[j].y - cars[i].y) > reach:
@@ -61,7 +61,7 @@ def _note_pair(cars, i, j, n, vehicles, found, reach, pairs, dt):
     return found
 
 
-@merged
+@inner
 def _insert(values, count, value):
     """Add a value to `count` sorted ones."""
     while count > 0 and values[count - 1] > value:
@@ -70,7 +70,7 @@ def _insert(values, count, value):
     values[count] = value
 
 
-@compiled
+@part
 def _collide_pair(cars, i, j, corners, dt):
     first, second = cars[i], cars[j]
     touches, will_touch, x, y = overlap(first, second, corners, dt)
@@ -84,25 +84,25 @@ def _collide_pair(cars, i, j, corners, dt):
         first.crashed = second.crashed = True
 
 
-@compiled
+@part
 def _hit(car, x, y):
     car.hit, car.impact_x, car.impact_y = True, x, y
 
 
-@merged
+@inner
 def diagonal(car):
     """Length of the diagonal of the car's box [m]."""
     return np.sqrt(car.length**2 + car.width**2)
 
 
-@merged
+@inner
 def is_near(first, second, dt):
     """The quick test before the exact one. Only the speed of the first car counts."""
     centres = norm(second.x - first.x, second.y - first.y)
     return not centres > (diagonal(first) + diagonal(second)) / 2 + first.speed * dt
 
 
-@compiled
+@part
 def overlap(first, second, corners, dt):
     """Separating-axis test of two boxes, now and during the next frame.
 
@@ -154,7 +154,7 @@ def overlap(first, second, corners, dt):
     return touches, will_touch, shortest * away_x, shortest * away_y
 
 
-@merged
+@inner
 def _are_apart(first, second, dt):
     """Cheap and never wrong: does an axis of the first box part the two by a safe margin, moves included?
 
@@ -174,13 +174,13 @@ def _are_apart(first, second, dt):
     return _gap(far_along, move_along, along) > 1e-6 or _gap(far_across, move_across, across) > 1e-6
 
 
-@merged
+@inner
 def _gap(far, step, half_sizes):
     """Gap on one axis between boxes `far` apart when the first one moves by `step` toward positive."""
     return max(far - max(step, 0.0), min(step, 0.0) - far) - half_sizes
 
 
-@merged
+@inner
 def _fill_corners(car, corners):
     for p in range(4):
         along = -car.length / 2 if p < 2 else car.length / 2
@@ -189,12 +189,12 @@ def _fill_corners(car, corners):
         corners[p, 1] = car.sin * along + car.cos * across + car.y
 
 
-@merged
+@inner
 def _mean(values):
     return (values[0] + values[1] + values[2] + values[3]) / 4
 
 
-@merged
+@inner
 def _span(corners, nx, ny):
     """Interval that a box covers on an axis."""
     low = high = dot(corners[0, 0], corners[0, 1], nx, ny)
@@ -204,7 +204,7 @@ def _span(corners, nx, ny):
     return low, high
 
 
-@merged
+@inner
 def _between(low_1, high_1, low_2, high_2):
     """Distance of two intervals, negative where they overlap."""
     return low_2 - high_1 if low_1 < low_2 else low_1 - high_2

@@ -12,7 +12,7 @@ from numba.np.random._constants import (
     ziggurat_nor_r,
 )
 
-from rss_shield.envs.compiled import compiled
+from rss_shield.shield._numba.compiled import part
 
 GENERATOR = [
     ("state_high", "u8"),
@@ -52,7 +52,7 @@ def generator_state(record) -> dict:
     }
 
 
-@compiled
+@part
 def _high_product(a, b):
     """Upper 64 bits of the product of two 64-bit numbers."""
     a_low, a_high = a & _LOW_HALF, a >> _SHIFT_32
@@ -62,7 +62,7 @@ def _high_product(a, b):
     return a_high * b_high + (middle >> _SHIFT_32) + (cross >> _SHIFT_32)
 
 
-@compiled
+@part
 def next_64(rng):
     """Next 64 random bits."""
     high, low = rng.state_high, rng.state_low
@@ -76,7 +76,7 @@ def next_64(rng):
     return (bits >> turn) | (bits << ((np.uint64(64) - turn) & np.uint64(63)))
 
 
-@compiled
+@part
 def next_32(rng):
     """Next 32 random bits; half of every 64 is kept for the next call."""
     if rng.has_spare != 0:
@@ -88,19 +88,19 @@ def next_32(rng):
     return bits & _LOW_HALF
 
 
-@compiled
+@part
 def random(rng):
     """`Generator.random()`: uniform in [0, 1)."""
     return np.float64(next_64(rng) >> np.uint64(11)) * _TO_UNIT
 
 
-@compiled
+@part
 def uniform(rng, low, high):
     """`Generator.uniform(low, high)`."""
     return low + (high - low) * random(rng)
 
 
-@compiled
+@part
 def integers(rng, n):
     """`Generator.integers(n)`, also `choice` of n things. Draws nothing for n = 1."""
     if n == 1:
@@ -114,7 +114,7 @@ def integers(rng, n):
     return np.int64(product >> _SHIFT_32)
 
 
-@compiled
+@part
 def two_of(rng, n):
     """`Generator.choice(n, 2, replace=False)` of up to 10 000 things: Floyd's algorithm, then a shuffle."""
     first, second = integers(rng, n - 1), integers(rng, n)
@@ -125,7 +125,7 @@ def two_of(rng, n):
     return first, second
 
 
-@compiled
+@part
 def normal(rng):
     """`Generator.normal()`: standard normal, by the ziggurat."""
     while True:

@@ -9,18 +9,18 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from rss_shield.envs._numpy.floats import clip, dot, not_zero
 from rss_shield.envs._numpy.ufuncs import power, power_each
-from rss_shield.envs.compiled import compiled, merged
 from rss_shield.envs.fast.sight import car_ahead, car_behind, locate
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
 from rss_shield.envs.roads.network import distance, is_after_end, is_reachable, local_coordinates, position
 from rss_shield.envs.roads.steering import is_aligned, steer
+from rss_shield.shield._numba.compiled import inner, part
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)  # as in `DiscreteMetaAction.ACTIONS_ALL`
 
 _KP_ACCELERATION = ControlledVehicle.KP_A  # [1/s]
 
 
-@merged
+@inner
 def list_changing(cars, n, sight):
     """Fill `sight.changing` with the cars that head for another lane; returns how many."""
     changing = np.int64(0)
@@ -30,7 +30,7 @@ def list_changing(cars, n, sight):
     return changing
 
 
-@merged
+@inner
 def decide(cars, first, last, n, changing, net, lanes, sight, idm):
     """Commands of the vehicles `first` to `last` - 1 for one frame.
 
@@ -54,7 +54,7 @@ def decide(cars, first, last, n, changing, net, lanes, sight, idm):
     return changing
 
 
-@merged
+@inner
 def _speed_up(cars, first, last, lanes, sight, idm):
     """Accelerations on a free road."""
     count = 0
@@ -69,7 +69,7 @@ def _speed_up(cars, first, last, lanes, sight, idm):
         sight.free[sight.some[b]] = idm.comfort_acc_max * (1 - sight.z[b])
 
 
-@merged
+@inner
 def _follow(cars, first, last, n, net, lanes, sight, idm):
     """Accelerate behind the car ahead; returns how many may do more than that, listed in `sight.some`."""
     busy = 0
@@ -88,7 +88,7 @@ def _follow(cars, first, last, n, net, lanes, sight, idm):
     return busy
 
 
-@merged
+@inner
 def _change_lanes(cars, busy, n, changing, net, lanes, sight, idm):
     """Follow roads, and begin, go on with or give up lane changes, one car after the other; returns `changing`."""
     for b in range(busy):
@@ -112,7 +112,7 @@ def _change_lanes(cars, busy, n, changing, net, lanes, sight, idm):
     return changing
 
 
-@merged
+@inner
 def _carry_out(cars, first, last, lanes, sight, idm):
     """Commands for what was decided."""
     turning = 0
@@ -128,7 +128,7 @@ def _carry_out(cars, first, last, lanes, sight, idm):
     steer(cars, turning, lanes, sight)
 
 
-@merged
+@inner
 def _is_in_traffic(car):
     """Is it driven by IDM and MOBIL, and not a wreck?"""
     return (car.kind == TRAFFIC) & (not car.crashed)
@@ -137,7 +137,7 @@ def _is_in_traffic(car):
 # ---------------------------------------------------------------- the controlled vehicle
 
 
-@compiled
+@part
 def take_meta_action(cars, i, action, net, lanes, sight, target_speeds):
     """Change the target speed or lane of the car, as `MDPVehicle.act` does with a label."""
     car = cars[i]
@@ -155,7 +155,7 @@ def take_meta_action(cars, i, action, net, lanes, sight, target_speeds):
             car.target_lane = lane
 
 
-@merged
+@inner
 def speed_to_index(speed, target_speeds):
     """Index of the target speed nearest to `speed`, the speeds being evenly spaced."""
     last = len(target_speeds) - 1
@@ -166,7 +166,7 @@ def speed_to_index(speed, target_speeds):
 # ---------------------------------------------------------------- routes
 
 
-@merged
+@inner
 def follow_road(cars, i, net, lanes, sight):
     """At the end of the target lane, head for the next one."""
     car = cars[i]
@@ -178,7 +178,7 @@ def follow_road(cars, i, net, lanes, sight):
         locate(k, i, cars, lanes, sight)
 
 
-@merged
+@inner
 def route_length(net, route):
     """Number of steps of a route."""
     length = 0
@@ -187,7 +187,7 @@ def route_length(net, route):
     return length
 
 
-@merged
+@inner
 def _next_lane(car, s, net, lanes):
     """Lane that continues the target lane: along the route, else the nearest one."""
     k = car.target_lane
@@ -215,7 +215,7 @@ def _next_lane(car, s, net, lanes):
     return nearest
 
 
-@merged
+@inner
 def _lane_on(road, lane_id, k, x, y, net, lanes):
     """Lane of the next road to take from lane `k`, and its distance to a point [m]."""
     first = net.roads[road].first
@@ -235,7 +235,7 @@ def _lane_on(road, lane_id, k, x, y, net, lanes):
 # ---------------------------------------------------------------- traffic: IDM and MOBIL
 
 
-@merged
+@inner
 def _speed_ratio(car, lanes):
     """Speed over the speed that a car wants on its lane."""
     target = 0.0 if car.kind == DIRECT else car.target_speed
@@ -243,7 +243,7 @@ def _speed_ratio(car, lanes):
     return max(car.speed, 0.0) / abs(not_zero(target))
 
 
-@merged
+@inner
 def _interaction(cars, i, ahead, lanes, s, idm):
     """What car `ahead`, -1 = none, takes from the acceleration of car `i` on a free road (IDM) [m/s^2]."""
     if ahead < 0:
@@ -257,7 +257,7 @@ def _interaction(cars, i, ahead, lanes, s, idm):
     return idm.comfort_acc_max * (ratio * ratio)
 
 
-@merged
+@inner
 def _has_to_brake(cars, i, ahead, delta, lanes, s, idm):
     """Would car `i`, -1 = none, brake harder behind car `ahead` than a change of lanes may impose on it?
 
@@ -273,7 +273,7 @@ def _has_to_brake(cars, i, ahead, delta, lanes, s, idm):
     return idm.comfort_acc_max * (1 - power(ratio, delta)) - taken < -idm.max_braking_imposed
 
 
-@merged
+@inner
 def desired_gap(cars, i, ahead, idm):
     """Distance that car `i` wants to the car ahead, centre to centre [m]."""
     car, front = cars[i], cars[ahead]
@@ -286,7 +286,7 @@ def desired_gap(cars, i, ahead, idm):
     return idm.distance_wanted + car.speed * idm.time_wanted + car.speed * approach / idm.gap_braking
 
 
-@merged
+@inner
 def _change_lane(cars, i, n, changing, free, a, net, lanes, sight, idm):
     """Start a lane change, or give one up.
 
@@ -313,7 +313,7 @@ def _change_lane(cars, i, n, changing, free, a, net, lanes, sight, idm):
             car.target_lane = k
 
 
-@merged
+@inner
 def _give_way(cars, i, changing, sight, idm):
     """Abort a lane change if somebody close ahead is already changing to the same lane."""
     car = cars[i]
@@ -330,7 +330,7 @@ def _give_way(cars, i, changing, sight, idm):
             return
 
 
-@merged
+@inner
 def _is_change_worthwhile(cars, i, k, n, free, a, net, lanes, sight, idm):
     """MOBIL for drivers without politeness: does a change to lane `k` help, and harm nobody?
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import typeof
 
-from rss_shield.envs.compiled import compiled, kernel, merged, unfolded
+from rss_shield.envs.compiled import kernel, unfolded
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.draws import load_generator
 from rss_shield.envs.fast.drivers import take_meta_action
@@ -46,7 +46,7 @@ from rss_shield.envs.fast.threads import Crew
 from rss_shield.envs.fast.traffic_flow import let_traffic_flow, open_intersection
 from rss_shield.envs.options import PLANS, Settings, scheme_of
 from rss_shield.envs.roads.network import Network
-from rss_shield.shield._numba.compiled import compiling_quickly, rare
+from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, rare
 from rss_shield.shield.comfort import RIDE
 from rss_shield.shield.junctions.controller import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
@@ -123,7 +123,7 @@ def _populate(cars, episode, order, world, sight, flow):
         open_intersection(cars, episode, order, net, sight, config, flow, world.target_speeds)
 
 
-@merged
+@inner
 def _go_on(cars, episode, order, world, plans, watch, mode, flow):
     """Cars come and go between two decisions."""
     if flow is not None:
@@ -148,7 +148,7 @@ def _restart(cars, episode, order, world, sight, distances, plans, ride, watch, 
     _see_apart(cars, episode, world, sight, out)
 
 
-@merged
+@inner
 def _see(cars, episode, world, sight, out):
     observe(
         cars,
@@ -170,7 +170,7 @@ def _see_apart(cars, episode, world, sight, out):
     _see(cars, episode, world, sight, out)
 
 
-@compiled
+@part
 def _report(cars, episode, ride, mode, cost, step):
     """Fill in what every step says."""
     ego = cars[episode.ego]

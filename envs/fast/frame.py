@@ -4,15 +4,15 @@
 without what only the other needs.
 """
 
-from rss_shield.envs.compiled import merged
 from rss_shield.envs.fast.collisions import collide
 from rss_shield.envs.fast.drivers import decide, list_changing
 from rss_shield.envs.fast.motion import move
 from rss_shield.envs.fast.regulation import regulate
 from rss_shield.envs.fast.sight import line_up, place, project, sort_along_x, update_lanes
+from rss_shield.shield._numba.compiled import inner
 
 
-@merged
+@inner
 def survey(cars, episode, net, sight, flow):
     """Find out where everybody is. Nobody has moved since their lanes were found."""
     if flow is None:
@@ -21,7 +21,7 @@ def survey(cars, episode, net, sight, flow):
         place(cars, episode.cars, net.lanes, sight)
 
 
-@merged
+@inner
 def look_around(cars, episode, order, net, sight, flow):
     """Get ready to `think`, after a survey; returns how many cars change lanes."""
     if flow is None:
@@ -29,13 +29,13 @@ def look_around(cars, episode, order, net, sight, flow):
     return list_changing(cars, episode.cars, sight)
 
 
-@merged
+@inner
 def think(cars, episode, first, last, changing, net, sight, config):
     """Commands of the vehicles `first` to `last` - 1; returns how many cars change lanes then."""
     return decide(cars, first, last, episode.cars, changing, net, net.lanes, sight, config)
 
 
-@merged
+@inner
 def act(cars, episode, order, net, sight, config, flow):
     """Carry the commands out, survey the result and find collisions."""
     if flow is not None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from rss_shield.envs._numpy.floats import norm
 from rss_shield.envs._numpy.ufuncs import arctan, tan
-from rss_shield.envs.compiled import compiled, merged
 from rss_shield.envs.fast.collisions import is_near, overlap
 from rss_shield.envs.fast.neighbours import Distances, Past, car_of, measure, row_before, start_past
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
@@ -26,7 +25,7 @@ from rss_shield.envs.roads.ways import (
     no_roads,
     track_of,
 )
-from rss_shield.shield._numba.compiled import rare
+from rss_shield.shield._numba.compiled import inner, part, rare
 from rss_shield.shield.comfort import comfort_of, ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.geometry import largest_half_extents
@@ -100,7 +99,7 @@ def make_watch(heading_bound):
 # Of the next two one is None, and numba leaves out of the kernel what it would need.
 
 
-@merged
+@inner
 def distances_of(e, frames, past):
     """`Distances` of environment `e` of a batch."""
     if frames is None:
@@ -108,7 +107,7 @@ def distances_of(e, frames, past):
     return Distances(frames, Past(past.memory[e], past.trail[e], past.ego[e], past.near[e]))
 
 
-@merged
+@inner
 def plans_of(e, ways, crossings):
     """`Plans` of environment `e` of a batch."""
     if ways is None:
@@ -139,7 +138,7 @@ def start_watch(episode, distances, plans, ride, watch):
     episode.ego_excess = episode.other_excess = 0.0
 
 
-@compiled
+@part
 def carry_over(episode, cars, crossings, ego, watch):
     """Cars came and went, as they do at intersections: everybody's past moves along.
 
@@ -153,7 +152,7 @@ def carry_over(episode, cars, crossings, ego, watch):
         crossings[i] = watch.blank_crossing[0] if was < 0 else crossings[was if was < ego else was - 1]
 
 
-@merged
+@inner
 def start_tally(step):
     """Nothing has happened in this decision yet."""
     step.frames = step.overridden = step.anticipated = step.limited = 0
@@ -164,7 +163,7 @@ def start_tally(step):
     step.partner, step.response = -1, 0
 
 
-@merged
+@inner
 def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, settings, step):
     """Restrict the ego's command on one frame, unless it has had its contact.
 
@@ -191,7 +190,7 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, sett
     ride_on(ride, ego.speed, ego.heading, gap, settings.dt)
 
 
-@merged
+@inner
 def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step):
     """Defs. 1-10, along the lane of the ego."""
     car, past = cars[episode.ego], distances.past
@@ -244,7 +243,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         step.partner = car_of(danger.partner, episode)
 
 
-@merged
+@inner
 def _keep_plan(cars, episode, sight, plans, settings, step):
     """Defs. 14-18: a plan through the junction ahead."""
     car, n = cars[episode.ego], episode.cars - 1
@@ -272,7 +271,7 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
     episode.pairs_possible += report.possible
 
 
-@merged
+@inner
 def _count(episode, step, danger, response, anticipated, pairs, broken, overrides):
     """Take what happened on one frame into the tally."""
     overridden = (response.overridden or episode.refused) and overrides
@@ -295,7 +294,7 @@ def _count(episode, step, danger, response, anticipated, pairs, broken, override
     episode.min_ttc = min(episode.min_ttc, danger.ttc)
 
 
-@merged
+@inner
 def _count_change(episode, step, acceleration, steering):
     """Take the sizes of what was changed on one frame into the tally [m/s^2], [rad]."""
     step.acceleration_change = max(step.acceleration_change, acceleration)
@@ -306,7 +305,7 @@ def _count_change(episode, step, acceleration, steering):
     episode.steering_changed += steering
 
 
-@merged
+@inner
 def start_ride(ride):
     """Forget how the ride felt."""
     ride.samples = ride.uncomfortable = ride.hard = ride.brakings = ride.gaps = 0
@@ -318,7 +317,7 @@ def start_ride(ride):
             ride.counts[quantity, b] = 0
 
 
-@compiled
+@part
 def report_comfort(ride, step):
     """Fill in how the ride has felt so far."""
     for k, value in enumerate(comfort_of(ride)):
@@ -328,7 +327,7 @@ def report_comfort(ride, step):
 # ---------------------------------------------------------------- lane changes
 
 
-@merged
+@inner
 def refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, settings, step):
     """Ignore a lane change of this decision that leaves no plan, is blocked, or comes half-way through another.
 
@@ -341,7 +340,7 @@ def refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, se
         _refuse_blocked(before, cars, episode, lanes, sight, settings, step)
 
 
-@compiled
+@part
 def _refuse_blocked(before, cars, episode, lanes, sight, settings, step):
     ego = cars[episode.ego]
     if not settings.overrides or not settings.rules.take_back or episode.blame != 0 or ego.kind != META:
@@ -355,13 +354,13 @@ def _refuse_blocked(before, cars, episode, lanes, sight, settings, step):
         step.lane_change_refused = True
 
 
-@merged
+@inner
 def _is_blocked(k, episode, sight):
     """Is the way to the centre of lane `k` blocked?"""
     return is_blocked(sight.lateral[k, episode.ego], episode.room_left, episode.room_right)
 
 
-@merged
+@inner
 def _take_back(wish, car, ego, episode, lanes, sight, body, settings, step):
     """`envs.highway.ego.ShieldedEgo._taken_back`: what the agent wants, and the lane that it heads for from now on."""
     slip = wish.slip
@@ -377,7 +376,7 @@ def _take_back(wish, car, ego, episode, lanes, sight, body, settings, step):
     return Command(wish.acceleration, slip)
 
 
-@compiled
+@part
 def _reachable(here, target, episode, lanes, sight):
     """Lane that the ego can get to: its target, one on the way, the one it is on, or the one it has come from."""
     if lanes[target].road != lanes[here].road:
@@ -396,7 +395,7 @@ def _reachable(here, target, episode, lanes, sight):
     return here + step
 
 
-@compiled
+@part
 def _refuse_lane_change(before, cars, episode, sight, plans, settings):
     ego = cars[episode.ego]
     if not settings.overrides or episode.blame != 0 or ego.kind != META:
@@ -411,7 +410,7 @@ def _refuse_lane_change(before, cars, episode, sight, plans, settings):
         episode.refused = True
 
 
-@merged
+@inner
 def _scene(cars, episode, sight, plans, settings, judging):
     """The ego's track and the ways that the others may take.
 
@@ -443,7 +442,7 @@ def _scene(cars, episode, sight, plans, settings, judging):
     return Scene(roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, drift)
 
 
-@merged
+@inner
 def _describe(car, choice, out):
     out.x, out.y, out.heading, out.speed, out.length, out.width = (
         car.x,
@@ -459,7 +458,7 @@ def _describe(car, choice, out):
         out.lane, out.choice = car.target_lane, choice[car.route + 1, car.target_lane]
 
 
-@merged
+@inner
 def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
     """Has the ego touched somebody, or is it about to? Judged at the first such sample."""
     ego = cars[episode.ego]
@@ -488,7 +487,7 @@ def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
             episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
 
 
-@compiled
+@part
 def _list_partners(cars, episode, sight, dt):
     """Put those in touch with the ego, or else the nearest, into `sight.some`; returns how many."""
     count, nearest, best = 0, -1, np.inf
@@ -524,7 +523,7 @@ def _verdict(i, cars, episode, sight, distances, plans, settings):
     return verdict, axes
 
 
-@compiled
+@part
 def _weight(verdict):
     """Of several contacts at once, the one that weighs most against the ego counts."""
     if verdict == NOBODY:
@@ -536,7 +535,7 @@ def _weight(verdict):
     return 1 if verdict == OTHER else 0
 
 
-@compiled
+@part
 def _touches(cars, k, ego, sight, dt):
     first, second = cars[min(k, ego)], cars[max(k, ego)]
     if not (first.checks or second.checks) or not is_near(first, second, dt):
@@ -545,7 +544,7 @@ def _touches(cars, k, ego, sight, dt):
     return touches or will_touch
 
 
-@merged
+@inner
 def is_at_fault(blame):
     """Does a blame code charge the ego?"""
     return blame == 1 + EGO or blame == 1 + BOTH

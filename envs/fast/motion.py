@@ -3,18 +3,18 @@
 import numpy as np
 
 from rss_shield.envs._numpy.ufuncs import arctan_each, tan_each
-from rss_shield.envs.compiled import merged
 from rss_shield.envs.fast.state import DIRECT, TRAFFIC
+from rss_shield.shield._numba.compiled import inner
 
 
-@merged
+@inner
 def set_heading(car, heading):
     """Turn a car, and keep its direction along."""
     car.heading = heading
     car.cos, car.sin = np.cos(heading), np.sin(heading)
 
 
-@merged
+@inner
 def move(cars, n_vehicles, sight, dt, max_speed, min_speed):
     """Advance all vehicles by one frame.
 
@@ -57,7 +57,7 @@ def move(cars, n_vehicles, sight, dt, max_speed, min_speed):
         car.speed += car.acceleration * dt
 
 
-@merged
+@inner
 def _displace(car, cos, sin, dt):
     """Move a car in a direction, and by the impact if it was hit."""
     car.x += car.speed * cos * dt
@@ -68,7 +68,7 @@ def _displace(car, cos, sin, dt):
         car.crashed, car.hit = True, False
 
 
-@merged
+@inner
 def _limit(car, max_speed, min_speed):
     """A wreck brakes to a stop; nobody accelerates beyond the range of speeds."""
     if car.crashed:

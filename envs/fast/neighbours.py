@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.envs.compiled import merged
 from rss_shield.envs.fast.state import OBSTACLE
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import reach_of, road_through
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
-from rss_shield.shield._numba.compiled import rare
+from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
 from rss_shield.shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
 from rss_shield.shield.lanes.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
@@ -89,7 +88,7 @@ def make_past(num_envs: int, n: int) -> Past:
     )
 
 
-@merged
+@inner
 def start_past(episode, past, blank):
     """Forget everybody at the start of an episode; `blank`: `[1]` MEMORY of a first sight."""
     for i in range(len(past.memory)):
@@ -100,7 +99,7 @@ def start_past(episode, past, blank):
         _mark_all(episode, past)
 
 
-@merged
+@inner
 def _mark_all(episode, past):
     """Count everybody among the near ones."""
     episode.near = episode.cars - 1
@@ -108,13 +107,13 @@ def _mark_all(episode, past):
         past.near[i] = i
 
 
-@merged
+@inner
 def car_of(user, episode):
     """Index among the cars of an index among the others."""
     return user if user < episode.ego else user + 1
 
 
-@merged
+@inner
 def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nearest, soonest):
     """Take this frame in, and measure the ego and whoever matters on it in the ego's lane frame.
 
@@ -165,7 +164,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     return look_ahead(road, ego.x, ego.y, ego.speed, ego.length / 2, dt)
 
 
-@merged
+@inner
 def _note_gap(along, across, box, own, sight):
     """Keep the smallest gap ahead in `sight.z[0]` [m]; `box`, `own`: length and width of the two."""
     sight.z[0] = min(sight.z[0], gap_in_way(along, across, own[0] + box[0], own[1] + box[1]))
@@ -177,20 +176,20 @@ def _make_up(road, pose, earlier, box, dt, user):
     user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
 
 
-@merged
+@inner
 def _row(episode, frames):
     """Row of the trail so many frames on."""
     row = episode.turn + frames
     return row if row < _FRAMES else row - _FRAMES
 
 
-@merged
+@inner
 def row_before(episode):
     """Row of the trail of the frame before the last."""
     return _row(episode, _FRAMES - 1)
 
 
-@merged
+@inner
 def _choose_frame(episode, distances, lane):
     """Measure along the lane the ego is on: (the one before, do gaps jump with it?)."""
     before = episode.frame_lane
@@ -209,7 +208,7 @@ def _start_again(episode, past, road, before, earlier, box, dt):
     _to_record(road, before[episode.ego], earlier[episode.ego], box, dt, past.ego[row_before(episode)])
 
 
-@merged
+@inner
 def _note(car, pose):
     """Keep where a car is."""
     pose.x, pose.y, pose.heading, pose.speed = car.x, car.y, car.heading, car.speed
@@ -218,12 +217,12 @@ def _note(car, pose):
     pose.in_own_lane = True
 
 
-@merged
+@inner
 def _to_record(road, pose, before, box, dt, user):
     to_lane_frame(road, pose.x, pose.y, pose.heading, pose.speed, pose.cos, pose.sin, before.x, before.y, box, dt, user)
 
 
-@merged
+@inner
 def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest):
     """Note where everybody is, and bound the longitudinal margin of each from below in `sight.x` [m].
 
@@ -277,7 +276,7 @@ def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings
     return nearest
 
 
-@merged
+@inner
 def _choose_near(episode, past, bounds, threshold):
     """Drop those of the near ones who are far by now, and list whoever is near."""
     for a in range(episode.near):
@@ -293,7 +292,7 @@ def _choose_near(episode, past, bounds, threshold):
     episode.near = count
 
 
-@merged
+@inner
 def _in_own_lane(k, car, ego, lanes, sight):
     """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
     if car.cos * ego.cos + car.sin * ego.sin > 0.0:

@@ -3,17 +3,17 @@
 import numpy as np
 
 from rss_shield.envs._numpy.floats import clip, dot, lmap, norm, not_zero
-from rss_shield.envs.compiled import compiled, merged
 from rss_shield.envs.fast.config import COS_H, HEADING, PRESENCE, TIME_TO_COLLISION, VX, VY, X, Y
 from rss_shield.envs.fast.sight import locate
 from rss_shield.envs.fast.state import OBSTACLE
+from rss_shield.shield._numba.compiled import inner, part
 
 _PERCEPTION = 200.0  # `AbstractEnv.PERCEPTION_DISTANCE` [m]
 _BEHIND = -10.0  # twice the length of a car [m]
 _LANE_WIDTH = 4.0  # `AbstractLane.DEFAULT_WIDTH` [m]
 
 
-@merged
+@inner
 def observe(cars, episode, lanes, sight, config, features, ranges, connected, target_speeds, out):
     """The observation that the configuration asks for.
 
@@ -32,7 +32,7 @@ def observe(cars, episode, lanes, sight, config, features, ranges, connected, ta
         _observe_kinematics(cars, episode, lanes, sight, config, features, ranges, out)
 
 
-@merged
+@inner
 def _observe_kinematics(cars, episode, lanes, sight, config, features, ranges, out):
     """The ego and the cars nearest to it along its lane (`KinematicObservation`, `ExitObservation`)."""
     ego = cars[episode.ego]
@@ -59,7 +59,7 @@ def _observe_kinematics(cars, episode, lanes, sight, config, features, ranges, o
             out[row * n_features + k] = value
 
 
-@merged
+@inner
 def _find_nearest(cars, episode, lanes, sight, config):
     """Fill `sight.nearest` with the observed road users, nearest along the lane first; returns how many."""
     ego = cars[episode.ego]
@@ -89,7 +89,7 @@ def _find_nearest(cars, episode, lanes, sight, config):
     return count
 
 
-@merged
+@inner
 def _feature(feature, car):
     if feature == PRESENCE:
         return 1.0
@@ -108,7 +108,7 @@ def _feature(feature, car):
     return car.sin
 
 
-@compiled
+@part
 def _observe_times(cars, episode, lanes, sight, config, connected, target_speeds, out):
     """Predicted times to collision around the ego's speed and lane (`TimeToCollisionObservation`)."""
     ego = cars[episode.ego]
@@ -130,7 +130,7 @@ def _observe_times(cars, episode, lanes, sight, config, connected, target_speeds
                 out[(a * 3 + b) * config.times + t] = value
 
 
-@compiled
+@part
 def _mark_collisions(cars, episode, v, j, n_lanes, lanes, sight, config, connected, target_speeds):
     """Mark in the grid when the ego would meet car `j` at target speed `v`."""
     ego, other = cars[episode.ego], cars[j]

@@ -7,17 +7,17 @@ within three seconds the one on the lane of lower priority stops, unless it is t
 import numpy as np
 
 from rss_shield.envs._numpy.floats import dot, norm
-from rss_shield.envs.compiled import merged
 from rss_shield.envs.fast.motion import move
 from rss_shield.envs.fast.sight import MOMENTS
 from rss_shield.envs.fast.state import DIRECT, TRAFFIC
 from rss_shield.envs.roads.network import heading_at, position
+from rss_shield.shield._numba.compiled import inner
 
 _STEP = 0.25  # between the moments looked at [s]
 _LOWEST, _HIGHEST = MOMENTS, MOMENTS + 1  # rows of `sight.futures` after those of the moments
 
 
-@merged
+@inner
 def regulate(cars, episode, net, sight, config, flow):
     """Decide who yields, if it is time to.
 
@@ -53,7 +53,7 @@ def regulate(cars, episode, net, sight, config, flow):
                 loser.target_speed, loser.yields = 0.0, True
 
 
-@merged
+@inner
 def _first_yields(first, second, lanes):
     """Does the first of two cars yield, by the priority of their lanes, else because it is behind?"""
     mine, theirs = lanes[first.lane].priority, lanes[second.lane].priority
@@ -66,7 +66,7 @@ def _first_yields(first, second, lanes):
 # ---------------------------------------------------------------- predictions
 
 
-@merged
+@inner
 def _predict_route(car, s, net, future):
     """Poses of a car on the middle of its route, as if its arc length counted from the start of that route.
 
@@ -94,14 +94,14 @@ def _predict_route(car, s, net, future):
         future[t, 2] = heading_at(lanes[k], along)
 
 
-@merged
+@inner
 def _route_lane(car, step, net):
     """Lane of a step of a car's route; where the route leaves it open, the one that it is on now."""
     lane_id = net.route_lanes[car.route, step]
     return net.roads[net.route_roads[car.route, step]].first + (lane_id if lane_id >= 0 else net.lanes[car.lane].id)
 
 
-@merged
+@inner
 def _predict_steering(car, sight, future, config):
     """Poses of a directly driven car that keeps its steering and does not accelerate."""
     ghost = sight.ghost
@@ -112,7 +112,7 @@ def _predict_steering(car, sight, future, config):
         future[t, 0], future[t, 1], future[t, 2] = ghost[0].x, ghost[0].y, ghost[0].heading
 
 
-@merged
+@inner
 def _enclose(future):
     """Note the range of the predicted positions."""
     for a in range(2):
@@ -125,7 +125,7 @@ def _enclose(future):
 # ---------------------------------------------------------------- meetings
 
 
-@merged
+@inner
 def _never_meet(one, other, near):
     """Are two cars surely farther than `near` apart at all moments?"""
     near += 1e-6
@@ -135,7 +135,7 @@ def _never_meet(one, other, near):
     return False
 
 
-@merged
+@inner
 def _will_meet(one, other, first, second):
     """Do the boxes of two cars, half as long again, overlap at any of the moments?"""
     near = first.length + 1e-6
@@ -148,7 +148,7 @@ def _will_meet(one, other, first, second):
     return False
 
 
-@merged
+@inner
 def _has_corner_inside(pose, car, box, other):
     """Is a corner, the middle of an edge or the centre of one car's box inside another's?
 

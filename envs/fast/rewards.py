@@ -3,10 +3,10 @@
 import numpy as np
 
 from rss_shield.envs._numpy.floats import clip, lmap
-from rss_shield.envs.compiled import merged
 from rss_shield.envs.fast.config import EXIT, HIGHWAY, INTERSECTION, MERGE, TWO_WAY
 from rss_shield.envs.fast.state import DIRECT
 from rss_shield.envs.roads.network import is_on_lane
+from rss_shield.shield._numba.compiled import inner
 
 _EXIT_DISTANCE = 25.0  # beyond an intersection [m]
 
@@ -14,21 +14,21 @@ _EXIT_DISTANCE = 25.0  # beyond an intersection [m]
 NO_ACTION = np.int64(-1)
 
 
-@merged
+@inner
 def is_on_road(cars, i, lanes, sight):
     """Is a car on the lane that is nearest to it?"""
     k = cars[i].lane
     return is_on_lane(lanes[k], sight.s[k, i], sight.lateral[k, i], 0.0)
 
 
-@merged
+@inner
 def has_arrived(cars, i, lanes, sight):
     """Has a car left the intersection?"""
     k = cars[i].lane
     return lanes[k].exits and sight.s[k, i] >= _EXIT_DISTANCE
 
 
-@merged
+@inner
 def rate(cars, episode, action, lanes, sight, config, step):
     """Reward of the last decision; its components go to `step`.
 
@@ -86,20 +86,20 @@ def rate(cars, episode, action, lanes, sight, config, step):
     return _normalized(_weigh(step, config), config) * on_road
 
 
-@merged
+@inner
 def _scaled(speed, config):
     """Speed on the scale of the rewarded range."""
     return lmap(speed, config.speed_low, config.speed_high, 0.0, 1.0)
 
 
-@merged
+@inner
 def _normalized(reward, config):
     if config.normalize_reward:
         return lmap(reward, config.reward_low, config.reward_high, 0.0, 1.0)
     return reward
 
 
-@merged
+@inner
 def _slowness(cars, episode, lane):
     """By what share of their target speeds the cars on a lane are too slow, added up."""
     total = 0.0
@@ -109,7 +109,7 @@ def _slowness(cars, episode, lane):
     return total
 
 
-@merged
+@inner
 def _weigh(step, config):
     """Weighted sum of the components, added up in their order."""
     reward = config.weight_0 * step.reward_0
@@ -119,7 +119,7 @@ def _weigh(step, config):
     return reward + config.weight_4 * step.reward_4
 
 
-@merged
+@inner
 def is_terminated(cars, episode, lanes, sight, config):
     """Is the state terminal?"""
     ego = cars[episode.ego]
@@ -128,7 +128,7 @@ def is_terminated(cars, episode, lanes, sight, config):
     return ego.crashed or ego.x > config.end_x or off_road or arrived
 
 
-@merged
+@inner
 def is_truncated(episode, config):
     """Is the time over?"""
     return episode.time >= config.duration or (config.max_steps > 0 and episode.steps >= config.max_steps)

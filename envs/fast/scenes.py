@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from rss_shield.envs.compiled import compiled
 from rss_shield.envs.fast.config import EXIT, HIGHWAY, MERGE, ROUNDABOUT, TWO_WAY
 from rss_shield.envs.fast.draws import integers, normal, random, uniform
 from rss_shield.envs.fast.drivers import speed_to_index
 from rss_shield.envs.fast.motion import set_heading
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, closest_lane, heading_at, local_coordinates, position
+from rss_shield.shield._numba.compiled import part
 
 
-@compiled
+@part
 def make_scene(cars, episode, order, net, lanes, config, target_speeds, lane_odds):
     """Populate the road.
 
@@ -40,7 +40,7 @@ def make_scene(cars, episode, order, net, lanes, config, target_speeds, lane_odd
         order[i] = i
 
 
-@compiled
+@part
 def add_vehicle(cars, episode, x, y, heading, speed, lanes, config):
     """Put a new vehicle on the road; returns its index."""
     i = episode.cars
@@ -64,7 +64,7 @@ def add_vehicle(cars, episode, x, y, heading, speed, lanes, config):
     return i
 
 
-@compiled
+@part
 def add_ego(cars, episode, x, y, heading, speed, lanes, config, target_speeds):
     """Put the controlled vehicle on the road; returns its index."""
     i = add_vehicle(cars, episode, x, y, heading, speed, lanes, config)
@@ -76,7 +76,7 @@ def add_ego(cars, episode, x, y, heading, speed, lanes, config, target_speeds):
     return i
 
 
-@compiled
+@part
 def _ahead_of_all(cars, episode, lane, speed, spacing, config):
     """Arc length of the next car of a random queue: ahead of everybody by a random gap [m]."""
     offset = spacing * (12 + 1.0 * speed) * config.lanes_factor
@@ -86,7 +86,7 @@ def _ahead_of_all(cars, episode, lane, speed, spacing, config):
     return s + offset * uniform(episode, 0.9, 1.1)
 
 
-@compiled
+@part
 def _highway(cars, episode, lanes, config, target_speeds):
     lane = lanes[config.ego_lane if config.ego_lane >= 0 else integers(episode, len(lanes))]
     s = _ahead_of_all(cars, episode, lane, 25.0, config.ego_spacing, config)
@@ -101,14 +101,14 @@ def _highway(cars, episode, lanes, config, target_speeds):
         cars[i].checks = config.traffic_checks
 
 
-@compiled
+@part
 def add_on_lane(cars, episode, lane, s, speed, lanes, config):
     """Put a car of the traffic on a lane, along it; returns its index."""
     x, y = position(lane, s, 0.0)
     return add_vehicle(cars, episode, x, y, heading_at(lane, s), speed, lanes, config)
 
 
-@compiled
+@part
 def _merge(cars, episode, lanes, config, target_speeds):
     x, y = position(lanes[config.main_lane + 1], 30.0, 0.0)
     add_ego(cars, episode, x, y, 0.0, 30.0, lanes, config, target_speeds)
@@ -126,7 +126,7 @@ def _merge(cars, episode, lanes, config, target_speeds):
     episode.vehicles -= 1
 
 
-@compiled
+@part
 def _two_way(cars, episode, lanes, config, target_speeds):
     lane = lanes[config.main_lane + 1]
     x, y = position(lane, 30.0, 0.0)
@@ -142,7 +142,7 @@ def _two_way(cars, episode, lanes, config, target_speeds):
         cars[i].target_lane = config.side_lane
 
 
-@compiled
+@part
 def _exit(cars, episode, net, lanes, config, target_speeds, lane_odds):
     lane = lanes[config.main_lane]
     s = _ahead_of_all(cars, episode, lane, 25.0, config.ego_spacing, config)
@@ -156,7 +156,7 @@ def _exit(cars, episode, net, lanes, config, target_speeds, lane_odds):
         cars[i].changes_lane = False
 
 
-@compiled
+@part
 def _choose(episode, odds):
     """`Generator.choice` by cumulative odds."""
     drawn = random(episode)
@@ -166,7 +166,7 @@ def _choose(episode, odds):
     return k
 
 
-@compiled
+@part
 def _roundabout(cars, episode, net, lanes, config, target_speeds):
     lane = lanes[config.main_lane]
     x, y = position(lane, 125.0, 0.0)
@@ -179,7 +179,7 @@ def _roundabout(cars, episode, net, lanes, config, target_speeds):
     _add_incoming(cars, episode, net, lanes, config, config.other_lane, 50.0, -1)
 
 
-@compiled
+@part
 def _add_incoming(cars, episode, net, lanes, config, k, s, destination):
     """Put a car on lane `k` near arc length `s`, bound for a destination, -1 = drawn."""
     s += normal(episode) * 2.0

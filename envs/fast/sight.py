@@ -13,7 +13,6 @@ import numpy as np
 
 from rss_shield.envs._numpy.floats import wrap_to_pi
 from rss_shield.envs._numpy.ufuncs import arctan2_each
-from rss_shield.envs.compiled import merged
 from rss_shield.envs.fast.state import CAR
 from rss_shield.envs.roads.network import (
     CAR_LENGTH,
@@ -27,6 +26,7 @@ from rss_shield.envs.roads.network import (
     local_coordinates,
 )
 from rss_shield.envs.roads.ways import CAR_ON_ROAD
+from rss_shield.shield._numba.compiled import inner
 from rss_shield.shield.junctions.controller import SAMPLE
 from rss_shield.shield.junctions.plans import THREAT
 from rss_shield.shield.lanes.pair import ROAD_USER
@@ -98,7 +98,7 @@ def make_sight(n_lanes, n, speeds, lanes, times):
     )
 
 
-@merged
+@inner
 def project(cars, n, net, sight):
     """Lane coordinates of all cars on all lanes."""
     if net.spacing > 0.0:
@@ -120,7 +120,7 @@ def project(cars, n, net, sight):
                 s[i], lateral[i] = beside(lane, cars[i].x - lane.x, cars[i].y - lane.y)
 
 
-@merged
+@inner
 def update_lanes(cars, n, net, sight):
     """Put every vehicle on the lane that is nearest in position and heading."""
     lanes = net.lanes
@@ -144,20 +144,20 @@ def update_lanes(cars, n, net, sight):
         car.lane = nearest
 
 
-@merged
+@inner
 def _is_beyond(bound, i, k, lanes, sight):
     """Is a car farther than `bound` from lane `k`, in position alone [m]? The angle only adds to it."""
     return distance(lanes[k], sight.s[k, i], sight.lateral[k, i]) > bound
 
 
-@merged
+@inner
 def _far_from(car, i, k, lanes, sight):
     """How far a car is from lane `k` in position [m] and heading [rad], added up."""
     lane, s = lanes[k], sight.s[k, i]
     return distance(lane, s, sight.lateral[k, i]) + abs(wrap_to_pi(car.heading - heading_at(lane, s)))
 
 
-@merged
+@inner
 def place(cars, n, lanes, sight):
     """`project` and `update_lanes` at once, for many short lanes.
 
@@ -193,14 +193,14 @@ def place(cars, n, lanes, sight):
         sight.on[i] = on
 
 
-@merged
+@inner
 def locate(k, i, cars, lanes, sight):
     """Make sure that the lane coordinates of car `i` on lane `k` are known."""
     if np.isnan(sight.s[k, i]):
         sight.s[k, i], sight.lateral[k, i] = local_coordinates(lanes[k], cars[i].x, cars[i].y)
 
 
-@merged
+@inner
 def sort_along_x(cars, n, order):
     """Keep `order` `[N]` sorted by x, ties by index; it changes little from frame to frame."""
     for a in range(1, n):
@@ -212,7 +212,7 @@ def sort_along_x(cars, n, order):
         order[b + 1] = i
 
 
-@merged
+@inner
 def line_up(n, net, order, sight):
     """Sort the cars on each lane by arc length, ties by index."""
     for k in range(len(net.lanes)):
@@ -225,7 +225,7 @@ def line_up(n, net, order, sight):
 # Which cars are on a lane cannot be foretold, so the next two have no branches that ask for it.
 
 
-@merged
+@inner
 def _line_up_along_x(k, n, lane, order, sight):
     """`line_up` on a lane along the x-axis; returns how many cars are on it."""
     s, lateral, members, rank = sight.s[k], sight.lateral[k], sight.members[k], sight.rank[k]
@@ -240,7 +240,7 @@ def _line_up_along_x(k, n, lane, order, sight):
     return count
 
 
-@merged
+@inner
 def _line_up_along(k, n, lane, order, sight):
     """`line_up` on any lane; who is not on it gets no rank."""
     s, lateral, members, rank = sight.s[k], sight.lateral[k], sight.members[k], sight.rank[k]
@@ -262,7 +262,7 @@ def _line_up_along(k, n, lane, order, sight):
     return count
 
 
-@merged
+@inner
 def _place(k, i, sight):
     """Place of car `i` among the members of lane `k`, or the one that it would take."""
     place = sight.rank[k, i]
@@ -279,7 +279,7 @@ def _place(k, i, sight):
     return low
 
 
-@merged
+@inner
 def car_ahead(k, i, n, net, lanes, sight):
     """Nearest car ahead of car `i` on lane `k`, -1 = none. Of several side by side the last one."""
     if net.links.shape[1] > 1:
@@ -299,7 +299,7 @@ def car_ahead(k, i, n, net, lanes, sight):
     return -1
 
 
-@merged
+@inner
 def car_behind(k, i, n, net, lanes, sight):
     """Nearest car behind car `i` on lane `k`, -1 = none. Of several side by side the first one."""
     if net.links.shape[1] > 1:
@@ -315,7 +315,7 @@ def car_behind(k, i, n, net, lanes, sight):
     return members[behind]
 
 
-@merged
+@inner
 def _along(k, j, net, lanes, sight):
     """Arc length of car `j` seen from lane `k` through its connected lanes, and whether it is on one."""
     for m in range(net.links.shape[1]):
@@ -327,7 +327,7 @@ def _along(k, j, net, lanes, sight):
     return 0.0, False
 
 
-@merged
+@inner
 def _car_ahead_connected(k, i, n, net, lanes, sight):
     nearest, ahead = np.inf, -1
     bits = net.link_bits[k]
@@ -339,7 +339,7 @@ def _car_ahead_connected(k, i, n, net, lanes, sight):
     return ahead
 
 
-@merged
+@inner
 def _car_behind_connected(k, i, n, net, lanes, sight):
     nearest, behind = -np.inf, -1
     bits = net.link_bits[k]

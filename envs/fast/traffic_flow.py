@@ -3,12 +3,12 @@
 import numpy as np
 
 from rss_shield.envs._numpy.floats import norm
-from rss_shield.envs.compiled import compiled
 from rss_shield.envs.fast.draws import integers, normal, random, two_of, uniform
 from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.scenes import add_ego, add_on_lane
 from rss_shield.envs.fast.sight import sort_along_x
 from rss_shield.envs.roads.network import heading_at, local_coordinates, position
+from rss_shield.shield._numba.compiled import part
 
 _CLEARANCE = 15.0  # of a new car to all others [m]
 _EGO_CLEARANCE = 20.0  # others are removed within it [m]
@@ -16,7 +16,7 @@ _ANYWHERE, _STRAIGHT_ON = np.int64(0), np.int64(1)  # where cars are bound for
 _LEAVING = 20.0  # cars vanish that far before the end of the world [m]
 
 
-@compiled
+@part
 def open_intersection(cars, episode, order, net, sight, config, flow, target_speeds):
     """Populate the roads, let the traffic run for three seconds, then add the ego.
 
@@ -49,7 +49,7 @@ def open_intersection(cars, episode, order, net, sight, config, flow, target_spe
     episode.observed_lanes = lanes[cars[episode.ego].lane].siblings
 
 
-@compiled
+@part
 def let_traffic_flow(cars, episode, order, net, config, flow):
     """After each decision: cars that leave are gone, and a new one may come."""
     for i in range(len(cars)):
@@ -65,13 +65,13 @@ def let_traffic_flow(cars, episode, order, net, config, flow):
     _renumber(cars, episode, order)
 
 
-@compiled
+@part
 def _arc_length(lane, car):
     s, _ = local_coordinates(lane, car.x, car.y)
     return s
 
 
-@compiled
+@part
 def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, net, config, flow):
     """Perhaps put a new car on one of the entries, around arc length `s` [m], bound for another arm."""
     if random(episode) > probability:
@@ -94,7 +94,7 @@ def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, ne
     cars[i].delta = uniform(episode, config.delta_low, config.delta_high)
 
 
-@compiled
+@part
 def _add_ego_on_its_way(cars, episode, net, config, flow, target_speeds):
     """Put the ego on the southern entry and clear its surroundings."""
     destination = flow.destination
@@ -115,14 +115,14 @@ def _add_ego_on_its_way(cars, episode, net, config, flow, target_speeds):
             i += 1
 
 
-@compiled
+@part
 def _is_full(cars, episode):
     """Is there no room for another car? The engine tells the user."""
     episode.overflow = episode.overflow or episode.cars == len(cars)
     return episode.cars == len(cars)
 
 
-@compiled
+@part
 def _remove(cars, episode, i):
     """Take a car off the road; those after it move up."""
     for j in range(i, episode.cars - 1):
@@ -134,7 +134,7 @@ def _remove(cars, episode, i):
     cars[episode.cars].length = 0.0
 
 
-@compiled
+@part
 def _renumber(cars, episode, order):
     """Sort afresh after cars came or went."""
     for i in range(episode.cars):

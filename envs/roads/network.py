@@ -13,7 +13,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from rss_shield.envs._numpy.floats import dot, norm, wrap_to_pi
 from rss_shield.envs._numpy.ufuncs import arctan, arctan2
-from rss_shield.envs.compiled import callable_too, compiled, merged
+from rss_shield.shield._numba.compiled import compiled, inner, part
 
 CAR_LENGTH, CAR_WIDTH = 5.0, 2.0  # of every vehicle of highway-env [m]
 STRAIGHT, SINE, CIRCULAR = range(3)
@@ -205,7 +205,7 @@ def _padded(rows, dtype, filler, width: int = 1) -> np.ndarray:
 # ---------------------------------------------------------------- coordinates
 
 
-@callable_too
+@compiled
 def local_coordinates(lane, x, y):
     """Arc length and signed lateral offset of a point on a lane [m]."""
     dx, dy = x - lane.x, y - lane.y
@@ -214,14 +214,14 @@ def local_coordinates(lane, x, y):
     return beside(lane, dx, dy)
 
 
-@callable_too
+@compiled
 def around(lane, dx, dy, angle):
     """`local_coordinates` on a circular lane, of a point given by its offset from the centre [m, rad]."""
     phi = wrap_to_pi(angle - lane.start_phase) + lane.start_phase
     return lane.turn * (phi - lane.start_phase) * lane.radius, lane.turn * (lane.radius - norm(dx, dy))
 
 
-@callable_too
+@compiled
 def beside(lane, dx, dy):
     """`local_coordinates` on any other lane, of a point given by its offset from the start [m]."""
     s = dot(dx, dy, lane.dx, lane.dy)
@@ -231,7 +231,7 @@ def beside(lane, dx, dy):
     return s, lateral
 
 
-@callable_too
+@compiled
 def position(lane, s, lateral):
     """World position of a point given in lane coordinates [m]."""
     if lane.kind == CIRCULAR:
@@ -243,7 +243,7 @@ def position(lane, s, lateral):
     return lane.x + s * lane.dx + lateral * lane.lx, lane.y + s * lane.dy + lateral * lane.ly
 
 
-@callable_too
+@compiled
 def heading_at(lane, s):
     """Heading of a lane at arc length `s` [rad]."""
     if lane.kind == STRAIGHT:
@@ -254,7 +254,7 @@ def heading_at(lane, s):
     return lane.turn * s / lane.radius + lane.start_phase + np.pi / 2 * lane.turn
 
 
-@merged
+@inner
 def is_far(lane, x, y, across, along):
     """Is a point more than `across` to the side of a lane, or more than `along` beyond its ends [m]? In doubt no.
 
@@ -274,32 +274,32 @@ def is_far(lane, x, y, across, along):
     return (square > outer * outer) | (square < inner * inner)
 
 
-@merged
+@inner
 def distance(lane, s, lateral):
     """L1 distance of a point in lane coordinates to the lane [m]."""
     return abs(lateral) + max(s - lane.length, 0.0) + max(0.0 - s, 0.0)
 
 
-@merged
+@inner
 def is_on_lane(lane, s, lateral, margin):
     """Is a point in lane coordinates on the lane, or nearer to it than `margin` [m]?"""
     # without branches: which of several lanes a car is on cannot be foretold
     return (abs(lateral) <= lane.width / 2 + margin) & (s >= -CAR_LENGTH) & (s < lane.length + CAR_LENGTH)
 
 
-@merged
+@inner
 def is_reachable(lane, s, lateral):
     """May a car at this point in lane coordinates change to the lane?"""
     return not lane.forbidden and abs(lateral) <= 2 * lane.width and 0.0 <= s < lane.length + CAR_LENGTH
 
 
-@merged
+@inner
 def is_after_end(lane, s):
     """Has a car at arc length `s` come to the end of the lane?"""
     return s > lane.length - CAR_LENGTH / 2
 
 
-@compiled
+@part
 def closest_lane(lanes, x, y, heading):
     """Index of the lane nearest to a pose in position and heading."""
     best, nearest = np.inf, 0

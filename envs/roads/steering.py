@@ -5,8 +5,8 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from rss_shield.envs._numpy.floats import clip, not_zero, wrap_to_pi
 from rss_shield.envs._numpy.ufuncs import arcsin, arcsin_each, arctan, arctan_each, tan, tan_each
-from rss_shield.envs.compiled import merged
 from rss_shield.envs.roads.network import heading_at
+from rss_shield.shield._numba.compiled import inner
 
 _PURSUIT = ControlledVehicle.TAU_PURSUIT  # [s]
 _KP_HEADING = ControlledVehicle.KP_HEADING  # [1/s]
@@ -15,13 +15,13 @@ _MAX_STEERING = ControlledVehicle.MAX_STEERING_ANGLE  # [rad]
 MAX_SLIP = float(np.arctan(np.tan(_MAX_STEERING) / 2))  # of a car's centre [rad]
 
 
-@merged
+@inner
 def is_aligned(lane, s, lateral, heading, speed):
     """Is there nothing to steer at a point in lane coordinates?"""
     return (lateral == 0.0) & (heading_at(lane, s + speed * _PURSUIT) == heading)
 
 
-@merged
+@inner
 def steering_angle(lane, s, lateral, heading, speed, length):
     """Steering angle of `ControlledVehicle.steering_control` at a point in lane coordinates [rad]."""
     if is_aligned(lane, s, lateral, heading, speed):
@@ -31,7 +31,7 @@ def steering_angle(lane, s, lateral, heading, speed, length):
     return clip(arctan(2 * tan(slip)), -_MAX_STEERING, _MAX_STEERING)
 
 
-@merged
+@inner
 def steer(cars, count, lanes, sight):
     """`steering_angle` for the first `count` cars of `sight.some`, step by step for all of them at once.
 
@@ -59,13 +59,13 @@ def steer(cars, count, lanes, sight):
         cars[some[b]].steering = clip(x[b], -_MAX_STEERING, _MAX_STEERING)
 
 
-@merged
+@inner
 def _sine_back(lateral, speed):
     """Sine of the course, relative to the lane, that leads back to its middle."""
     return clip(-_KP_LATERAL * lateral / not_zero(speed), -1.0, 1.0)
 
 
-@merged
+@inner
 def _sine_of_slip(lane, s, heading, speed, length, course):
     """Sine of the slip that turns a car to a course relative to the lane [rad], bounded to 45 degrees."""
     reference = heading_at(lane, s + speed * _PURSUIT) + clip(course, -np.pi / 4, np.pi / 4)

@@ -1,4 +1,16 @@
-"""How the functions of this package are compiled, and when again."""
+"""How the functions of this package are compiled, and when again.
+
+| decorator | Python may call it | in compiled callers | for |
+| --- | --- | --- | --- |
+| `compiled` | yes | merged | most functions: numbers, records and views of arrays |
+| `compiled_for_arrays` | yes | merged | what takes whole arrays, or makes them |
+| `apart` | yes | a function of its own | what is large and rarely called |
+| `inner` | no | merged | small parts of others |
+| `part` | no | a function of its own | large parts, and what has several callers |
+| `rare` | no | a function of its own, out of the way | what is seldom called |
+
+The engine has two more of its own in `envs.compiled`.
+"""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -39,6 +51,11 @@ def fingerprint(*more: Path) -> str:
 def inner(function: Callable[..., Any]) -> Any:
     """`compiled` for what is called from compiled functions only."""
     return only_inside(function, **PLAIN, **MERGED)
+
+
+def part(function: Callable[..., Any]) -> Any:
+    """`inner`, but a function of its own in its callers."""
+    return only_inside(function, **PLAIN, **APART)
 
 
 def compiled(function: Callable[..., Any]) -> Any:
