@@ -52,7 +52,7 @@ $(VENV)/installed: pyproject.toml constraints.txt
 	  echo "rss-shield needs Python 3.11 or newer; $(PYTHON) is $$($(PYTHON) --version 2>/dev/null || echo missing)."; \
 	  echo "Name another interpreter: make PYTHON=python3.11"; exit 1; } >&2
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[train]'
 	@touch $@
 
 $(VENV)/installed-dev: $(VENV)/installed

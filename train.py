@@ -1,6 +1,6 @@
 """Train PPO with and without the RSS shield, test each with and without it, and report who crashes."""
 
-from eval.interrupt import stop_on_interrupt
+from rss_shield.eval.interrupt import stop_on_interrupt
 
 if __name__ == "__main__":  # before all that takes its time
     stop_on_interrupt("train.py: stopping; nothing that is finished is lost, the same command with --resume goes on")
@@ -25,22 +25,20 @@ import numpy as np
 import tyro
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-import envs
-from agents.ppo import available_devices, hyperparameters, load_policy, rounded_timesteps, train
-from envs.configuration import check_config, default_config
-from envs.highway import PLANS
-from envs.shielding import PENALTIES
-from envs.vector import BACKENDS
-from envs.wrapper import WAITING, default_preset, scheme_of
-from eval.config_option import read_config, split_arguments, with_values
-from eval.jobs import Job, run_jobs
-from eval.replay import chosen, replay
-from eval.report import cell_path, read_cell, replay_path, write_cell, write_report
-from eval.rollout import evaluate
-from eval.run_folder import changes, open_run, recorded
-from shield.junction import ENTRIES
-from shield.params import PRESETS, Preset, RSSParams, Rules
-from shield.plans import INTENTS
+import rss_shield
+from rss_shield.agents.ppo import available_devices, hyperparameters, load_policy, rounded_timesteps, train
+from rss_shield.envs.configuration import check_config, default_config
+from rss_shield.envs.make_vec import BACKENDS
+from rss_shield.envs.options import PENALTIES, PLANS, WAITING, default_preset, scheme_of
+from rss_shield.eval.config_option import read_config, split_arguments, with_values
+from rss_shield.eval.jobs import Job, run_jobs
+from rss_shield.eval.replay import chosen, replay
+from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
+from rss_shield.eval.rollout import evaluate
+from rss_shield.eval.run_folder import changes, open_run, recorded
+from rss_shield.shield.junctions.controller import ENTRIES
+from rss_shield.shield.junctions.plans import INTENTS
+from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
 
 TRAIN_MODE = {"unshielded": "monitor", "shielded": "override"}  # what the shield does in training
 TEST_MODE = {"off": "monitor", "on": "override"}  # a monitor assigns blame and changes nothing
@@ -289,13 +287,13 @@ def _tried(config: Config, preset: Preset) -> gym.Env:
 
 def original(config: Config, preset: Preset, mode: str) -> Callable[..., gym.Env]:
     """Builds an environment of the original simulator."""
-    return functools.partial(envs.make, config.env_id, shield=mode, params=preset, **setting(config))
+    return functools.partial(rss_shield.make, config.env_id, shield=mode, params=preset, **setting(config))
 
 
 def batch(config: Config, preset: Preset, mode: str, n_envs: int, **options: Any) -> VectorEnv:
     """Environments of the chosen simulator side by side."""
     options |= {"backend": config.backend, "params": preset, **setting(config)}
-    return envs.make_vec(config.env_id, n_envs, shield=mode, **options)
+    return rss_shield.make_vec(config.env_id, n_envs, shield=mode, **options)
 
 
 def setting(config: Config) -> dict[str, Any]:
@@ -417,7 +415,7 @@ def preset_name(config: Config) -> str:
     """The preset asked for, or the one of the environment."""
     if config.preset != "auto":
         return config.preset
-    env = envs.make(config.env_id, shield=None)
+    env = rss_shield.make(config.env_id, shield=None)
     env.close()
     return default_preset(env.unwrapped)
 
@@ -499,5 +497,13 @@ def fail(message: str) -> NoReturn:
 
 if __name__ == "__main__":
     # worker processes are forked from a server that has imported the slow packages once
-    multiprocessing.set_forkserver_preload(["envs", "agents.ppo", "eval.jobs", "eval.orphans", "eval.rollout"])
+    multiprocessing.set_forkserver_preload(
+        [
+            "rss_shield.envs.make_vec",
+            "rss_shield.agents.ppo",
+            "rss_shield.eval.jobs",
+            "rss_shield.eval.orphans",
+            "rss_shield.eval.rollout",
+        ]
+    )
     main(sys.argv[1:])

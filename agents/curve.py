@@ -13,7 +13,7 @@ from typing import Any, TextIO
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from agents.vec_env import one
+from rss_shield.agents.vec_env import one
 
 NO_CONTACT = "no contact"  # an empty text would come back from a CSV file as a missing value
 COLUMNS = (

@@ -22,8 +22,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import FloatSchedule
 
-from agents.curve import CurveRecorder, truncate_curve
-from agents.vec_env import VectorEnvAdapter
+from rss_shield.agents.curve import CurveRecorder, truncate_curve
+from rss_shield.agents.vec_env import VectorEnvAdapter
 
 # For many environments side by side, and a few hundred thousand decisions
 ROLLOUT_STEPS = 8192  # decisions of all environments together between two updates, at most

@@ -21,12 +21,11 @@ import numpy as np
 import pandas as pd
 import tyro
 
-from envs import make
-from envs.hostile import HOSTILE
-from eval.files import atomic
-from eval.progress import progress_bar
-from eval.stats import wilson
-from shield import Rules
+from rss_shield import Rules, make
+from rss_shield.envs.highway.hostile import HOSTILE
+from rss_shield.eval.files import atomic
+from rss_shield.eval.progress import progress_bar
+from rss_shield.eval.stats import wilson
 
 ENVIRONMENTS = ("highway-fast-v0", "merge-v0", "two-way-v0", "u-turn-v0")
 BEFORE, AFTER = 3.0, 1.0  # [s]

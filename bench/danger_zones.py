@@ -25,8 +25,8 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from eval.stats import wilson
-from shield.danger_zones import (
+from rss_shield.eval.stats import wilson
+from rss_shield.shield.junctions.danger_zones import (
     FILTERS,
     NONE,
     Cars,
@@ -36,7 +36,7 @@ from shield.danger_zones import (
     conflict_table,
     danger_zones,
 )
-from shield.danger_zones import within_geofence as inside_fence
+from rss_shield.shield.junctions.danger_zones import within_geofence as inside_fence
 
 PUBLISHED = Path(__file__).parent.parent / "tests" / "data" / "v2x-examples.json"
 PUBLISHED_NAMES = {

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import tyro
 
-import envs
+import rss_shield
 
 SIZES = (1, 64, 1024, 4096)
 VEHICLES = (20, 50, 100, 200, 400)
@@ -65,9 +65,9 @@ class Candidate:
 
 def against_original(env_id: str, config: Config) -> None:
     """One environment: highway-env, the engine at several sizes, and the engine with the shield."""
-    original = Candidate(envs.make_vec(env_id, 1, shield=None, backend="highway-env"))
-    engine = {n: Candidate(envs.make_vec(env_id, n, shield=None)) for n in SIZES}
-    shielded = {mode: Candidate(envs.make_vec(env_id, 1024, shield=mode)) for mode in ("monitor", "override")}
+    original = Candidate(rss_shield.make_vec(env_id, 1, shield=None, backend="highway-env"))
+    engine = {n: Candidate(rss_shield.make_vec(env_id, n, shield=None)) for n in SIZES}
+    shielded = {mode: Candidate(rss_shield.make_vec(env_id, 1024, shield=mode)) for mode in ("monitor", "override")}
     for _ in range(config.rounds):
         original.take_turn(4 * config.seconds)
         for candidate in (*engine.values(), *shielded.values()):
@@ -85,7 +85,7 @@ def against_original(env_id: str, config: Config) -> None:
 def growth_with_vehicles(config: Config) -> None:
     """Vehicles at constant density; the exponent is a fit of time against vehicles, both as logarithms."""
     candidates = {
-        n: Candidate(envs.make_vec("highway-fast-v0", 64, None, config={"vehicles_count": n})) for n in VEHICLES
+        n: Candidate(rss_shield.make_vec("highway-fast-v0", 64, None, config={"vehicles_count": n})) for n in VEHICLES
     }
     for _ in range(config.rounds):
         for candidate in candidates.values():
@@ -97,7 +97,7 @@ def growth_with_vehicles(config: Config) -> None:
 
 def growth_with_environments(config: Config) -> None:
     """Environments in one batch."""
-    candidates = {n: Candidate(envs.make_vec("highway-fast-v0", n, None)) for n in ENVIRONMENTS}
+    candidates = {n: Candidate(rss_shield.make_vec("highway-fast-v0", n, None)) for n in ENVIRONMENTS}
     for _ in range(config.rounds):
         for candidate in candidates.values():
             candidate.take_turn(config.seconds)
@@ -107,7 +107,7 @@ def growth_with_environments(config: Config) -> None:
 
 def growth_with_threads(config: Config) -> None:
     """A second thread, by the clock on the wall."""
-    candidates = [Candidate(envs.make_vec("highway-fast-v0", 1024, None, threads=threads)) for threads in (1, 2)]
+    candidates = [Candidate(rss_shield.make_vec("highway-fast-v0", 1024, None, threads=threads)) for threads in (1, 2)]
     for _ in range(2 * config.rounds):
         for candidate in candidates:
             candidate.take_turn(config.seconds, time.perf_counter)

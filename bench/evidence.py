@@ -28,14 +28,14 @@ from gymnasium.vector import AutoresetMode
 from rich.console import Console
 from rich.table import Table
 
-import envs.random_roads
-from envs import make, make_vec
-from envs.traffic import RECKLESS
-from eval.files import atomic
-from eval.progress import progress_bar
-from eval.rollout import evaluate, run_episode
-from eval.stats import bootstrap_mean, wilson
+import rss_shield.envs.worlds.random_roads
+from rss_shield import make, make_vec
+from rss_shield.envs.highway.drivers import RECKLESS
+from rss_shield.eval.files import atomic
 from rss_shield.eval.pages import fill, markdown, spaced, write_page
+from rss_shield.eval.progress import progress_bar
+from rss_shield.eval.rollout import evaluate, run_episode
+from rss_shield.eval.stats import bootstrap_mean, wilson
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)
 AT_INTERSECTIONS = {SLOWER: 0, IDLE: 1, FASTER: 2}  # where nobody changes lanes
@@ -50,7 +50,7 @@ class Case(NamedTuple):
     policy: str
     episodes: int
     config: dict[str, Any]
-    options: dict[str, str] = {}  # noqa: RUF012  of `envs.make`, never changed
+    options: dict[str, str] = {}  # noqa: RUF012  of `rss_shield.make`, never changed
 
 
 def act(policy: str, rng: np.random.Generator, actions: int = 5) -> Any:
@@ -128,7 +128,7 @@ def _cases() -> dict[str, Case]:
     for policy in ("continuous", "full-throttle"):
         cases[f"intersection-v1-{policy}"] = Case("intersection-v1", policy, 300, {})
         cases[f"intersection-v1-{policy}-known"] = Case("intersection-v1", policy, 300, {}, {"intent": "known"})
-    for kind in envs.random_roads.KINDS:
+    for kind in rss_shield.envs.worlds.random_roads.KINDS:
         for policy in ("random", "faster"):
             cases[f"{kind}-{policy}"] = Case("random-roads-v0", policy, 100, {"kind": kind})
     reckless = {"other_vehicles_type": RECKLESS}

@@ -8,7 +8,7 @@
 
 *Progress*: every combination of entry, waiting and duration, beside the same traffic without a shield.
 *Intent*: the same seeds with intent known, assumed straight, and unknown. *Examined*: the same seeds with
-plans checked against fewer and fewer road users (`shield.examined`). An episode arrives if it ends
+plans checked against fewer and fewer road users (`shield.junctions.examined`). An episode arrives if it ends
 behind the intersection without a contact; "stuck" are the ones that ran out of time while a wreck or a
 standing car was in the way of the ego's path ahead. Episodes run in the compiled engine; a case whose
 file is there already is not played again.
@@ -30,16 +30,16 @@ from gymnasium.vector import AutoresetMode
 from rich.console import Console
 from rich.table import Table
 
-from envs import make_vec
-from envs.fast.network import local_coordinates
-from eval.files import atomic
-from eval.progress import progress_bar
-from eval.rollout import evaluate
-from eval.stats import Interval, bootstrap_mean, paired_difference, wilson
+from rss_shield import make_vec
+from rss_shield.envs.roads.network import local_coordinates
+from rss_shield.eval.files import atomic
 from rss_shield.eval.pages import markdown, write_page
-from shield.examined import EXAMINED
-from shield.junction import ENTRIES, block
-from shield.plans import INTENTS, NEVER, THREAT, Track
+from rss_shield.eval.progress import progress_bar
+from rss_shield.eval.rollout import evaluate
+from rss_shield.eval.stats import Interval, bootstrap_mean, paired_difference, wilson
+from rss_shield.shield.junctions.controller import ENTRIES, block
+from rss_shield.shield.junctions.examined import EXAMINED
+from rss_shield.shield.junctions.plans import INTENTS, NEVER, THREAT, Track
 
 ENV_ID = "intersection-v0"
 FASTER, ACTIONS = 2, 3  # SLOWER, IDLE, FASTER

@@ -26,16 +26,17 @@ from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.controller import MDPVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from envs import ShieldWrapper, make, make_vec
-from envs.fast.config import Unsupported
-from envs.highway import Settings, ShieldedEgo
-from envs.stock import make_stock
-from eval.files import write_text
-from eval.rollout import evaluate, run_episode
-from eval.stats import paired_difference
-from shield.kinematics import frames_for
-from shield.pair import assess
-from shield.params import PRESETS, Rules
+from rss_shield import ShieldWrapper, make, make_vec
+from rss_shield.envs.fast.config import Unsupported
+from rss_shield.envs.highway.ego import ShieldedEgo
+from rss_shield.envs.options import Settings
+from rss_shield.envs.stock import make_stock
+from rss_shield.eval.files import write_text
+from rss_shield.eval.rollout import evaluate, run_episode
+from rss_shield.eval.stats import paired_difference
+from rss_shield.shield.definitions.kinematics import frames_for
+from rss_shield.shield.lanes.pair import assess
+from rss_shield.shield.params import PRESETS, Rules
 
 ROADS = (
     *("highway-fast-v0", "highway-v0", "merge-v0", "merge-v1", "exit-v0", "two-way-v0", "u-turn-v0"),

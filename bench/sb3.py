@@ -14,9 +14,9 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
-import envs
-from agents.ppo import BATCHES, HYPERPARAMETERS, ROLLOUT_STEPS
-from agents.vec_env import VectorEnvAdapter
+import rss_shield
+from rss_shield.agents.ppo import BATCHES, HYPERPARAMETERS, ROLLOUT_STEPS
+from rss_shield.agents.vec_env import VectorEnvAdapter
 
 WORKERS = 2
 
@@ -49,8 +49,8 @@ def main() -> None:
     parser.add_argument("--rollouts", type=int, default=1, help="on highway-env; ten times as many in the engine")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
-    make = functools.partial(envs.make, arguments.env_id, shield=arguments.shield)
-    fast = VectorEnvAdapter(envs.make_vec(arguments.env_id, arguments.n_envs, shield=arguments.shield))
+    make = functools.partial(rss_shield.make, arguments.env_id, shield=arguments.shield)
+    fast = VectorEnvAdapter(rss_shield.make_vec(arguments.env_id, arguments.n_envs, shield=arguments.shield))
     engine = steps_per_second(fast, arguments.decisions, 10 * arguments.rollouts)
     print(f"engine, {arguments.n_envs} environments in one process: {engine:.0f} decisions/s", flush=True)
     original = steps_per_second(SubprocVecEnv([make] * WORKERS), arguments.decisions, arguments.rollouts)

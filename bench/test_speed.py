@@ -6,11 +6,18 @@ import numba
 import numpy as np
 import pytest
 
-from envs import make
-from envs.highway import ShieldedEgo
-from shield import PRESETS, d_min_lateral, d_min_opposite_direction, d_min_same_direction
-from shield.definitions.unstructured import DANGEROUS, ROW_FIELDS, VEHICLE, Mover, Occupancy, occupy, who_brakes
-from shield.risk import RiskSettings, marking, road_users, scene_risk
+from rss_shield import PRESETS, d_min_lateral, d_min_opposite_direction, d_min_same_direction, make
+from rss_shield.envs.highway.ego import ShieldedEgo
+from rss_shield.shield.definitions.unstructured import (
+    DANGEROUS,
+    ROW_FIELDS,
+    VEHICLE,
+    Mover,
+    Occupancy,
+    occupy,
+    who_brakes,
+)
+from rss_shield.shield.risk import RiskSettings, marking, road_users, scene_risk
 
 PAIRS = 10_000
 
@@ -30,7 +37,7 @@ class TimedEgo(ShieldedEgo):
     ("env_id", "steps"), [("highway-fast-v0", 60), ("highway-v0", 12)], ids=["20-vehicles", "50-vehicles"]
 )
 def test_cost_of_the_shield_per_frame(benchmark, env_id, steps, monkeypatch):
-    monkeypatch.setattr("envs.shielding.ShieldedEgo", TimedEgo)
+    monkeypatch.setattr("rss_shield.envs.highway.step.ShieldedEgo", TimedEgo)
     env = make(env_id)
     env.reset(seed=0)
     env.step(1)

@@ -7,23 +7,13 @@ from pathlib import Path
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
-PACKAGES = ("shield", "envs", "agents", "eval")
-STAGED = DOCS / "_build" / "sources" / "rss_shield"  # the folders under the names that they are imported by
+SOURCES = DOCS / "_build" / "sources"  # the package without the links in it, which are not followed
 
 
 def stage() -> None:
     """Copy the Python files to where their import names are their paths."""
-    shutil.rmtree(STAGED, ignore_errors=True)
-    face = ROOT / "rss_shield"
-    if face.is_dir():
-        shutil.copytree(face, STAGED, ignore=lambda folder, names: [n for n in names if not n.endswith(".py")])
-    STAGED.mkdir(parents=True, exist_ok=True)
-    for package in PACKAGES:
-        for source in sorted((ROOT / package).rglob("*.py")):
-            target = STAGED / source.relative_to(ROOT)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source, target)
-    (STAGED / "__init__.py").touch()
+    shutil.rmtree(SOURCES, ignore_errors=True)
+    shutil.copytree(ROOT / "rss_shield", SOURCES / "rss_shield", ignore=shutil.ignore_patterns("__pycache__"))
 
 
 stage()
@@ -50,7 +40,7 @@ linkcheck_ignore = [r"https?://.*"]  # local links only
 
 # ---------------------------------------------------------------- API
 
-autoapi_dirs = [str(STAGED)]
+autoapi_dirs = [str(SOURCES / "rss_shield")]
 autoapi_root = "api"
 autoapi_options = ["members", "undoc-members", "show-module-summary"]
 autoapi_member_order = "bysource"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from shield.params import PRESETS, Preset, RSSParams, Rules
+from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
 
 GIVEN = "given by the user"
 _SIDES = ("ego", "other")

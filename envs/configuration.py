@@ -12,8 +12,8 @@ from typing import Any
 import gymnasium as gym
 from highway_env.envs.common import action, observation
 
-from envs.signalised import KinematicsWithSignal
-from envs.stock import make_stock
+from rss_shield.envs.stock import make_stock
+from rss_shield.envs.worlds.signalised import KinematicsWithSignal
 
 TYPES: dict[str, dict[str, type]] = {
     "observation": {

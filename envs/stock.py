@@ -14,7 +14,7 @@ from highway_env.utils import class_from_path
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from envs.arguments import whole
+from rss_shield.envs.arguments import whole
 
 LONGEST_EPISODE = 100  # decisions, where highway-env sets no limit
 LOWEST_FREQUENCY = 5  # of simulation where roads cross [Hz]

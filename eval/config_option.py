@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from eval.files import to_json
+from rss_shield.eval.files import to_json
 
 PREFIX = "--config."
 Keys = tuple[str, ...]  # of a nested value: ("observation", "type")

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
-from eval.interrupt import children_ignore_interrupts
-from eval.progress import move_to, progress_bar
+from rss_shield.eval.interrupt import children_ignore_interrupts
+from rss_shield.eval.progress import move_to, progress_bar
 
 _TICK = 0.2  # seconds between two looks at the news
 

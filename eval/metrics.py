@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import pandas as pd
 
-from eval.stats import Interval, bootstrap_mean, bootstrap_median, paired_difference, student, wilson
+from rss_shield.eval.stats import Interval, bootstrap_mean, bootstrap_median, paired_difference, student, wilson
 
 BLAMES = ("ego", "both", "other", "inherited", "none")
 

@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from eval.files import atomic
-from eval.metrics import BLAMES
-from eval.stats import Interval, completion_weights, weighted_mean, weighted_rate, wilson
+from rss_shield.eval.files import atomic
+from rss_shield.eval.metrics import BLAMES
+from rss_shield.eval.stats import Interval, completion_weights, weighted_mean, weighted_rate, wilson
 
 # Okabe & Ito's colours, told apart with every common colour blindness
 ARM_COLOURS = {"unshielded": "#D55E00", "shielded": "#0072B2"}

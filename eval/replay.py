@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from eval.rollout import MakeEnv, Policy, run_episode
+from rss_shield.eval.rollout import MakeEnv, Policy, run_episode
 
 TOLERANCE = 1e-6  # of the return
 KEYS = ["train", "test", "train_seed", "seed"]

@@ -1,6 +1,6 @@
 """Everything a finished run reports, from its episodes and learning curves.
 
-`python -m eval.report runs/NAME` writes the report of a run anew, without training or testing.
+`python -m rss_shield.eval.report runs/NAME` writes the report of a run anew, without training or testing.
 """
 
 import json
@@ -11,12 +11,12 @@ from typing import Any
 import pandas as pd
 from rich.console import Console
 
-from eval.files import atomic, write_json
-from eval.metrics import differences, summarise
-from eval.plots import plot_blame, plot_learning_curve
-from eval.replay import compare, verdict
-from eval.run_folder import changes
-from eval.table import print_table, write_table
+from rss_shield.eval.files import atomic, write_json
+from rss_shield.eval.metrics import differences, summarise
+from rss_shield.eval.plots import plot_blame, plot_learning_curve
+from rss_shield.eval.replay import compare, verdict
+from rss_shield.eval.run_folder import changes
+from rss_shield.eval.table import print_table, write_table
 
 SHIELD = {"unshielded": "off", "shielded": "on"}  # arm -> shield while training
 _PLACE = {"line": "at the line", "anywhere": "anywhere"}
@@ -116,5 +116,5 @@ def read_cell(path: Path) -> pd.DataFrame:
 
 if __name__ == "__main__":
     if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "config.json").exists():
-        sys.exit("usage: python -m eval.report RUN, the folder of a finished run, e.g. runs/highway-fast-v0")
+        sys.exit("usage: python -m rss_shield.eval.report RUN, the folder of a finished run, e.g. runs/highway-fast-v0")
     write_report(Path(sys.argv[1]))

@@ -11,7 +11,7 @@ from typing import Any
 
 import llvmlite.binding
 
-from eval.files import to_json, write_json
+from rss_shield.eval.files import to_json, write_json
 
 PACKAGES = (
     "rss-shield",

@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from eval.files import atomic, write_text
-from eval.metrics import metrics_in
+from rss_shield.eval.files import atomic, write_text
+from rss_shield.eval.metrics import metrics_in
 
 LEGEND = (
     "train, test: shield off or on. crash (% of the n test episodes) = ego at fault + other at fault + inherited (the "

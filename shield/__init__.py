@@ -1,8 +1,12 @@
 """Responsibility-Sensitive Safety (RSS) as compiled functions. Imports numpy and numba, nothing else."""
 
-from shield.lateral import d_min_lateral, mu_lateral_velocity
-from shield.longitudinal import d_min_longitudinal, d_min_opposite_direction, d_min_same_direction
-from shield.params import PRESETS, ROADS, Preset, Road, RSSParams, Rules, on_road
+from rss_shield.shield.definitions.lateral import d_min_lateral, mu_lateral_velocity
+from rss_shield.shield.definitions.longitudinal import (
+    d_min_longitudinal,
+    d_min_opposite_direction,
+    d_min_same_direction,
+)
+from rss_shield.shield.params import PRESETS, ROADS, Preset, Road, RSSParams, Rules, on_road
 
 __all__ = [
     "PRESETS",

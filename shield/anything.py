@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numba.core.errors import NumbaError
 
-from shield.compiled import compiled_for_arrays
-from shield.params import RSSParams
+from rss_shield.shield._numba.compiled import compiled_for_arrays
+from rss_shield.shield.params import RSSParams
 
 _TABLES = ("rear", "front", "left", "right", "correct", "wrong")  # arguments that are `RSSParams`
 _SPEEDS = ("v_", "u_")  # how the names of speeds begin

@@ -1,6 +1,6 @@
 """Which of several road users are meant: those of a list, or everybody."""
 
-from shield.compiled import inner
+from rss_shield.shield._numba.compiled import inner
 
 
 @inner

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, inner
-from shield.geometry import wrap_angle
+from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield.geometry import wrap_angle
 
 A, JERK, LAT_A, LAT_JERK, YAW_A = range(5)  # the quantities measured
 WIDTHS = np.array([0.05, 0.25, 0.05, 0.25, 0.05])  # of the bins [m/s^2], [m/s^3], [m/s^2], [m/s^3], [rad/s^2]

@@ -13,7 +13,7 @@ behind: its arc length is the one ahead, and less by the way round (inf where th
 
 import numpy as np
 
-from shield.compiled import compiled, inner, rare
+from rss_shield.shield._numba.compiled import compiled, inner, rare
 
 PIECE_FIELDS = 11
 X, Y, HEADING, CURVATURE, LENGTH, ARC_START, COS, SIN, BEFORE, AFTER, AROUND = range(PIECE_FIELDS)

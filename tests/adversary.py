@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.blame import judge_contact, judge_frame
-from shield.command import Command
-from shield.compiled import compiled_for_arrays as compiled
-from shield.controller import Body, always_on, find_danger, respond, restrict
-from shield.geometry import half_extents, largest_half_extents
-from shield.kinematics import frames_for
-from shield.pair import ROAD_USER, assess
-from shield.params import PRESETS, RSSParams, Rules
-from shield.response import LAT, LON, MEMORY, merge, remember
+from rss_shield.shield._numba.compiled import compiled_for_arrays as compiled
+from rss_shield.shield.command import Command
+from rss_shield.shield.definitions.kinematics import frames_for
+from rss_shield.shield.geometry import half_extents, largest_half_extents
+from rss_shield.shield.lanes.controller import Body, always_on, find_danger, respond, restrict
+from rss_shield.shield.lanes.judge import judge_contact, judge_frame
+from rss_shield.shield.lanes.memory import LAT, LON, MEMORY, merge, remember
+from rss_shield.shield.lanes.pair import ROAD_USER, assess
+from rss_shield.shield.params import PRESETS, RSSParams, Rules
 
 HALF_WHEELBASE = 2.5  # [m]
 MAX_SLIP = float(np.arctan(np.tan(np.pi / 3) / 2))  # of highway-env's steering [rad]

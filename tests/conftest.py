@@ -6,7 +6,7 @@ And an intersection, which changes the class of all traffic in the process, chan
 import numpy as np
 import pytest
 
-from envs.stock import drivers_unchanged
+from rss_shield.envs.stock import drivers_unchanged
 
 np.seterr(divide="raise", over="raise", invalid="raise")
 

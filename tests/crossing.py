@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shield.longitudinal import euler_margin
-from shield.params import PRESETS
-from shield.right_of_way import (
+from rss_shield.shield.definitions.longitudinal import euler_margin
+from rss_shield.shield.definitions.right_of_way import (
     APART,
     ORDER,
     STOP,
@@ -25,6 +24,7 @@ from shield.right_of_way import (
     with_euler_margin,
     would_strand,
 )
+from rss_shield.shield.params import PRESETS
 
 DT = 1 / 15  # [s]
 AREA = 6.0  # way through the conflict area [m]

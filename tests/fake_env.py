@@ -59,7 +59,7 @@ class FakeEnvWithGoal(FakeEnv):
 
 
 def fake_vec(num_envs: int, autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP) -> SyncVectorEnv:
-    """Several of them, as `envs.make_vec` makes them."""
+    """Several of them, as `rss_shield.make_vec` makes them."""
     return SyncVectorEnv([lambda: RecordEpisodeStatistics(FakeEnv())] * num_envs, autoreset_mode=autoreset_mode)
 
 

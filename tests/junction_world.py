@@ -6,13 +6,13 @@ import gymnasium as gym
 import highway_env  # noqa: F401
 import numpy as np
 
-from envs.intent import Junction
-from envs.junction_ego import junction_of
-from shield.conflict_areas import cell_of, in_conflict
-from shield.examined import TABLE as TABLE_ONLY
-from shield.junction import CAUTIOUS, CROSSING, PLAN, SAMPLE, junction_frame
-from shield.params import PRESETS
-from shield.plans import THREAT, Scene, Track
+from rss_shield.envs.roads.ways import Junction, junction_of
+from rss_shield.shield.junctions.conflict_areas import cell_of, in_conflict
+from rss_shield.shield.junctions.controller import CAUTIOUS, CROSSING, PLAN, SAMPLE, judge_crossing, junction_frame
+from rss_shield.shield.junctions.examined import TABLE as TABLE_ONLY
+from rss_shield.shield.junctions.plans import THREAT, Scene, Track
+from rss_shield.shield.lanes.judge import VERDICTS
+from rss_shield.shield.params import PRESETS
 
 DT = 1 / 15
 TABLE = PRESETS["intersection"]
@@ -82,3 +82,9 @@ class Duel:
         return bool(
             in_conflict(paths, self.path, cell_of(self.s, paths.cells[self.path]), int(self.threats["path"][0]), s, s)
         )
+
+
+def verdict_of(duel, speed, outside=False):
+    sample = np.zeros(1, SAMPLE)[0]
+    sample["speed"] = speed
+    return VERDICTS[judge_crossing(sample, duel.memory[0], outside, TABLE.other, DT).verdict]

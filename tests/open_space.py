@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.definitions.unstructured import ANY_WAY, BACKWARDS, Mover
+from rss_shield.shield.definitions.unstructured import ANY_WAY, BACKWARDS, Mover
 
 
 class Track(NamedTuple):

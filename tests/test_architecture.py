@@ -6,68 +6,97 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
-ROOT = Path(__file__).parent.parent
-MAY_IMPORT = {
+LIBRARIES = {
     "shield": {"numpy", "numba"},
-    "envs": {"shield", "gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo"},
+    "envs": {"gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo"},
     "agents": {"gymnasium", "stable_baselines3", "torch", "numpy"},
     "eval": {"numpy", "scipy", "pandas", "matplotlib", "rich", "tqdm", "llvmlite", "yaml"},
 }
-MODULES = [path for package in MAY_IMPORT for path in sorted((ROOT / package).rglob("*.py"))]
+# part -> parts that it may import, itself left out; a part is a folder, or the modules that lie in it directly
+LAWS = {"shield.definitions", "shield.params", "shield._numba"}
+OWES = {"shield.geometry", "shield.command", "shield.chosen", "shield.anything", "shield.comfort"}
+BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions"}
+ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
+ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
+MAY_IMPORT = {
+    "shield._numba": set(),
+    "shield.params": set(),
+    "shield.definitions": LAWS | {"shield.anything"},
+    "shield.risk": LAWS | OWES,
+    "shield.lanes": LAWS | OWES,
+    "shield.junctions": LAWS | OWES | {"shield.lanes"},  # a verdict is one on either kind of road
+    "envs._numpy": {"envs.compiled", "shield._numba"},
+    "envs.compiled": {"envs._numpy", "shield._numba"},
+    "envs.roads": ROADS | BELOW,
+    "envs.worlds": {"envs.stock"} | ROADS | BELOW,
+    "envs.highway": ROADS | ENTRY | BELOW | {"envs.make", "shield.risk"},
+    "envs.fast": ROADS | ENTRY | BELOW,
+}
+MODULES = [path for package in LIBRARIES for path in sorted((ROOT / package).rglob("*.py"))]
+PARTED = [path for path in MODULES if path.name != "__init__.py" or len(path.relative_to(ROOT).parts) > 2]
 
 
-def imported_packages(path: Path) -> set[str]:
-    """Top-level packages that a module imports anywhere, the standard library left out."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            found.add(path.relative_to(ROOT).parts[0] if node.level else (node.module or "").split(".")[0])
-    return found - set(sys.stdlib_module_names)
-
-
-# what definitions may import of the shield: each other, some of which stand outside their folder
-DEFINITIONS = {"compiled", "definitions", "kinematics", "lateral", "longitudinal", "params"}
-
-
-def imported_from_shield(path: Path) -> set[str]:
-    """Modules of the shield that a module imports by name."""
+def names_imported(path: Path) -> set[str]:
+    """Modules that a module imports anywhere."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute here"
             found.add(node.module or "")
-    return {name.split(".")[1] if "." in name else name for name in found if name.split(".")[0] == "shield"}
+    return found
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "shield" / "definitions").glob("*.py")), ids=lambda path: path.name)
-def test_definitions_are_leaves(path):
-    assert imported_from_shield(path) <= DEFINITIONS
+def part_of(name: str) -> str:
+    """ "shield.lanes" of "shield.lanes.pair" """
+    return ".".join(name.split(".")[:2])
 
 
-def test_every_package_is_installed():
-    packages = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
-    folders = {path.parent.relative_to(ROOT).as_posix().replace("/", ".") for path in MODULES}
-    assert set(packages) == folders
-
-
-def test_every_package_has_modules():
-    assert {path.relative_to(ROOT).parts[0] for path in MODULES} == set(MAY_IMPORT)
+def own_part(path: Path) -> str:
+    return part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_a_module_imports_only_what_its_package_may(path):
+def test_a_package_imports_its_libraries_and_what_is_below_it(path):
     package = path.relative_to(ROOT).parts[0]
-    assert imported_packages(path) <= MAY_IMPORT[package] | {package}
+    below = {"rss_shield.shield"} if package == "envs" else set()
+    for name in names_imported(path):
+        top = name.split(".")[0]
+        if top == "rss_shield":
+            assert ".".join(name.split(".")[:2]) in below | {f"rss_shield.{package}"}
+        else:
+            assert top in LIBRARIES[package] | set(sys.stdlib_module_names)
 
 
-def test_nothing_in_the_shield_depends_on_the_measure_of_risk():
-    assert not [path for path in (ROOT / "shield").glob("*.py") if "shield.risk" in path.read_text(encoding="utf-8")]
+@pytest.mark.parametrize("path", PARTED, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_part_imports_what_is_below_it(path):
+    part = own_part(path)
+    imported = {part_of(name.removeprefix("rss_shield.")) for name in names_imported(path) if "rss_shield." in name}
+    if part in MAY_IMPORT:
+        assert imported - {part, "shield"} <= MAY_IMPORT[part]
+
+
+def test_the_two_simulators_are_siblings():
+    assert not MAY_IMPORT["envs.fast"] & {"envs.highway", "envs.make", "envs.make_vec"}
+    assert not MAY_IMPORT["envs.highway"] & {"envs.fast", "envs.make_vec"}
+
+
+def test_every_package_is_installed():
+    setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    folders = {path.parent.relative_to(ROOT).as_posix() for path in MODULES}
+    expected = {f"rss_shield.{folder.replace('/', '.')}": folder for folder in folders} | {"rss_shield": "rss_shield"}
+    assert setuptools["package-dir"] == expected
+    assert set(setuptools["packages"]) == set(expected)
+
+
+def test_the_links_of_the_checkout_lead_to_the_folders():
+    for package in LIBRARIES:
+        assert (ROOT / "rss_shield" / package).resolve() == ROOT / package
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "tests").rglob("*.py")), ids=lambda path: path.name)
 def test_nothing_imports_the_training_script(path):
-    assert "train" not in imported_packages(path)
+    assert not names_imported(path) & {"train", "rss_shield.train"}

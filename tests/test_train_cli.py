@@ -14,11 +14,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from PIL import Image
+from places import ROOT
 
-from eval.metrics import METRICS
-from shield.params import RSSParams
+from rss_shield.eval.metrics import METRICS
+from rss_shield.shield.params import RSSParams
 
-SCRIPT = Path(__file__).parent.parent / "train.py"
+SCRIPT = ROOT / "train.py"
 TINY = ["--total-timesteps", "64", "--seeds", "0", "--eval-episodes", "3", "--replay-episodes", "1", "--n-envs", "2"]
 CELLS = [("off", "off"), ("off", "on"), ("on", "off"), ("on", "on")]
 
@@ -253,7 +254,7 @@ def test_an_episode_tampered_with_is_named_in_the_report(finished, tmp_path):
     episodes = pd.read_csv(path)
     episodes.loc[episodes["seed"] == episode, "length"] += 1
     episodes.to_csv(path, index=False)
-    report = [sys.executable, "-m", "eval.report", str(folder)]
+    report = [sys.executable, "-m", "rss_shield.eval.report", str(folder)]
     output = subprocess.run(report, cwd=SCRIPT.parent, text=True, capture_output=True, check=True).stdout
     assert "3 of 4 test episodes agree" in " ".join(output.split())
     assert f"DISAGREES: train on, test on, training seed 0, episode {episode}: length" in " ".join(output.split())

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled, merged
-from envs.fast.floats import dot, norm
-from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
+from rss_shield.envs._numpy.floats import dot, norm
+from rss_shield.envs.compiled import compiled, merged
+from rss_shield.envs.fast.state import OBSTACLE
+from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH
 
 _LARGEST = np.hypot(CAR_LENGTH, CAR_WIDTH)  # diagonal of a road user [m]
 

@@ -14,9 +14,9 @@ from highway_env.envs.common.observation import ExitObservation, KinematicObserv
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from envs.fast.network import Network, compile_network
-from envs.fast.state import CAR_LENGTH, CAR_WIDTH, REWARDS
-from envs.stock import AT_INTERSECTIONS, drivers_unchanged, make_stock
+from rss_shield.envs.fast.state import REWARDS
+from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network, compile_network
+from rss_shield.envs.stock import AT_INTERSECTIONS, drivers_unchanged, make_stock
 
 HIGHWAY, MERGE, TWO_WAY, EXIT, ROUNDABOUT, INTERSECTION = range(6)
 KINEMATICS, TIME_TO_COLLISION = range(2)

@@ -12,7 +12,7 @@ from numba.np.random._constants import (
     ziggurat_nor_r,
 )
 
-from envs.fast.compiled import compiled
+from rss_shield.envs.compiled import compiled
 
 GENERATOR = [
     ("state_high", "u8"),

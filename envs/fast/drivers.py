@@ -7,13 +7,13 @@ plans, in the ego's turn.
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
-from envs.fast.compiled import compiled, merged
-from envs.fast.floats import clip, dot, not_zero
-from envs.fast.network import distance, is_after_end, is_reachable, local_coordinates, position
-from envs.fast.sight import car_ahead, car_behind, locate
-from envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
-from envs.fast.steering import is_aligned, steer
-from envs.fast.ufuncs import power, power_each
+from rss_shield.envs._numpy.floats import clip, dot, not_zero
+from rss_shield.envs._numpy.ufuncs import power, power_each
+from rss_shield.envs.compiled import compiled, merged
+from rss_shield.envs.fast.sight import car_ahead, car_behind, locate
+from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
+from rss_shield.envs.roads.network import distance, is_after_end, is_reachable, local_coordinates, position
+from rss_shield.envs.roads.steering import is_aligned, steer
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)  # as in `DiscreteMetaAction.ACTIONS_ALL`
 

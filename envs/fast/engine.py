@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import typeof
 
-from envs.fast.compiled import compiled, kernel, merged, unfolded
-from envs.fast.config import Scenario
-from envs.fast.draws import load_generator
-from envs.fast.drivers import take_meta_action
-from envs.fast.frame import act, look_around, survey, think
-from envs.fast.guard import (
+from rss_shield.envs.compiled import compiled, kernel, merged, unfolded
+from rss_shield.envs.fast.config import Scenario
+from rss_shield.envs.fast.draws import load_generator
+from rss_shield.envs.fast.drivers import take_meta_action
+from rss_shield.envs.fast.frame import act, look_around, survey, think
+from rss_shield.envs.fast.guard import (
     MONITOR,
     OFF,
     OVERRIDE,
@@ -36,21 +36,20 @@ from envs.fast.guard import (
     start_watch,
     watch_frame,
 )
-from envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past, no_lane_frames
-from envs.fast.network import Network
-from envs.fast.observations import observe
-from envs.fast.rewards import NO_ACTION, is_terminated, is_truncated, rate
-from envs.fast.scenes import make_scene
-from envs.fast.sight import make_sight, sort_along_x
-from envs.fast.state import CAR, EPISODE, STEP
-from envs.fast.threads import Crew
-from envs.fast.traffic_flow import let_traffic_flow, open_intersection
-from envs.highway import PLANS, Settings
-from envs.wrapper import scheme_of
-from shield.comfort import RIDE
-from shield.compiled import compiling_quickly, rare
-from shield.junction import CROSSING
-from shield.params import PRESETS, Rules
+from rss_shield.envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past, no_lane_frames
+from rss_shield.envs.fast.observations import observe
+from rss_shield.envs.fast.rewards import NO_ACTION, is_terminated, is_truncated, rate
+from rss_shield.envs.fast.scenes import make_scene
+from rss_shield.envs.fast.sight import make_sight, sort_along_x
+from rss_shield.envs.fast.state import CAR, EPISODE, STEP
+from rss_shield.envs.fast.threads import Crew
+from rss_shield.envs.fast.traffic_flow import let_traffic_flow, open_intersection
+from rss_shield.envs.options import PLANS, Settings, scheme_of
+from rss_shield.envs.roads.network import Network
+from rss_shield.shield._numba.compiled import compiling_quickly, rare
+from rss_shield.shield.comfort import RIDE
+from rss_shield.shield.junctions.controller import CROSSING
+from rss_shield.shield.params import PRESETS, Rules
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
 DECIDE, RESTART, STAY = range(3)  # what an environment does on a call
@@ -285,7 +284,7 @@ class Engine:
     Args:
       scenario: what to run.
       num_envs: E.
-      settings: `envs.highway.Settings` of the shield, None = no shield.
+      settings: `envs.highway.ego.Settings` of the shield, None = no shield.
       penalty: subtracted from the reward, times the share of frames that the shield overrode.
       autoreset: DISABLED, SAME_STEP or NEXT_STEP.
       threads: how many threads share the work.

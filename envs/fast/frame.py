@@ -4,12 +4,12 @@
 without what only the other needs.
 """
 
-from envs.fast.collisions import collide
-from envs.fast.compiled import merged
-from envs.fast.drivers import decide, list_changing
-from envs.fast.motion import move
-from envs.fast.regulation import regulate
-from envs.fast.sight import line_up, place, project, sort_along_x, update_lanes
+from rss_shield.envs.compiled import merged
+from rss_shield.envs.fast.collisions import collide
+from rss_shield.envs.fast.drivers import decide, list_changing
+from rss_shield.envs.fast.motion import move
+from rss_shield.envs.fast.regulation import regulate
+from rss_shield.envs.fast.sight import line_up, place, project, sort_along_x, update_lanes
 
 
 @merged

@@ -1,4 +1,4 @@
-"""The shield inside the frame loop: `envs.highway.ShieldedEgo` on the engine's arrays.
+"""The shield inside the frame loop: `envs.highway.ego.ShieldedEgo` on the engine's arrays.
 
 The formulas are those of `shield/`; here is only what reads the engine's cars, keeps the tally of a
 decision and writes the command back.
@@ -8,27 +8,35 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.collisions import is_near, overlap
-from envs.fast.compiled import compiled, merged
-from envs.fast.floats import norm
-from envs.fast.neighbours import Distances, Past, car_of, measure, row_before, start_past
-from envs.fast.network import Network
-from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
-from envs.fast.ufuncs import arctan, tan
-from envs.highway import MAX_SLIP
-from envs.intent import Junction, Roads, drift_of, is_outside, list_threats, no_roads, track_of
-from envs.junction_ego import junction_of
-from shield.blame import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
-from shield.comfort import comfort_of, ride_on
-from shield.command import Command
-from shield.compiled import rare
-from shield.controller import Body, Response, find_danger, respond
-from shield.geometry import largest_half_extents
-from shield.held_back import held_by
-from shield.junction import CROSSING, has_plan, judge_crossing, junction_frame
-from shield.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
-from shield.plans import Scene
-from shield.response import MEMORY, catch_up
+from rss_shield.envs._numpy.floats import norm
+from rss_shield.envs._numpy.ufuncs import arctan, tan
+from rss_shield.envs.compiled import compiled, merged
+from rss_shield.envs.fast.collisions import is_near, overlap
+from rss_shield.envs.fast.neighbours import Distances, Past, car_of, measure, row_before, start_past
+from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
+from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network
+from rss_shield.envs.roads.steering import MAX_SLIP
+from rss_shield.envs.roads.ways import (
+    Junction,
+    Roads,
+    drift_of,
+    is_outside,
+    junction_of,
+    list_threats,
+    no_roads,
+    track_of,
+)
+from rss_shield.shield._numba.compiled import rare
+from rss_shield.shield.comfort import comfort_of, ride_on
+from rss_shield.shield.command import Command
+from rss_shield.shield.geometry import largest_half_extents
+from rss_shield.shield.junctions.controller import CROSSING, has_plan, judge_crossing, junction_frame
+from rss_shield.shield.junctions.held_back import held_by
+from rss_shield.shield.junctions.plans import Scene
+from rss_shield.shield.lanes.controller import Body, Response, find_danger, respond
+from rss_shield.shield.lanes.judge import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
+from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
+from rss_shield.shield.lanes.memory import MEMORY, catch_up
 
 OFF, MONITOR, OVERRIDE = range(3)
 _PLANS = 4  # kinds of danger from here on are plans, in `infos`
@@ -168,7 +176,7 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, sett
       distances, plans: `Distances` or `Plans`; the other is None.
       ride: RIDE.
       watch: `Watch`.
-      settings: `envs.highway.Settings`.
+      settings: `envs.highway.ego.Settings`.
       step: STEP, the tally is kept there.
     """
     if check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
@@ -355,7 +363,7 @@ def _is_blocked(k, episode, sight):
 
 @merged
 def _take_back(wish, car, ego, episode, lanes, sight, body, settings, step):
-    """`envs.highway.ShieldedEgo._taken_back`: what the agent wants, and the lane that it heads for from now on."""
+    """`envs.highway.ego.ShieldedEgo._taken_back`: what the agent wants, and the lane that it heads for from now on."""
     slip = wish.slip
     if settings.rules.take_back and car.kind == DIRECT:
         rooms = episode.room_left, episode.room_right

@@ -6,11 +6,13 @@ nobody asks about.
 
 import numpy as np
 
-from envs.fast.config import EXIT, INTERSECTION, Scenario
-from envs.highway import AXES, Settings, response_name
-from envs.junction_ego import PLAN_NAMES
-from shield.blame import DUTIES, VERDICTS
-from shield.comfort import Comfort
+from rss_shield.envs.fast.config import EXIT, INTERSECTION, Scenario
+from rss_shield.envs.options import Settings
+from rss_shield.shield.comfort import Comfort
+from rss_shield.shield.junctions.plans import PLAN_NAMES
+from rss_shield.shield.lanes.controller import response_name
+from rss_shield.shield.lanes.judge import DUTIES, VERDICTS
+from rss_shield.shield.lanes.memory import AXES
 
 
 def _names(texts) -> np.ndarray:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from envs.fast.compiled import merged
-from envs.fast.state import DIRECT, TRAFFIC
-from envs.fast.ufuncs import arctan_each, tan_each
+from rss_shield.envs._numpy.ufuncs import arctan_each, tan_each
+from rss_shield.envs.compiled import merged
+from rss_shield.envs.fast.state import DIRECT, TRAFFIC
 
 
 @merged

@@ -9,18 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.compiled import merged
-from envs.fast.network import heading_at
-from envs.fast.state import CAR_LENGTH, CAR_WIDTH, OBSTACLE
-from envs.highway import Settings
-from envs.roads import reach_of, road_through
-from shield.comfort import gap_in_way
-from shield.compiled import rare
-from shield.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
-from shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
-from shield.lane_frame import look_ahead, same_frame, to_lane_frame
-from shield.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
-from shield.response import MEMORY, forget_safe
+from rss_shield.envs.compiled import merged
+from rss_shield.envs.fast.state import OBSTACLE
+from rss_shield.envs.options import Settings
+from rss_shield.envs.roads.lanes import reach_of, road_through
+from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
+from rss_shield.shield._numba.compiled import rare
+from rss_shield.shield.comfort import gap_in_way
+from rss_shield.shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
+from rss_shield.shield.lanes.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
+from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame
+from rss_shield.shield.lanes.memory import MEMORY, forget_safe
+from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
 
 _HALF_DIAGONAL = np.hypot(CAR_LENGTH, CAR_WIDTH) / 2  # no road user is longer, however it is turned [m]
 _ROUNDING = 1e-6  # more than world and lane coordinates differ by [m]
@@ -125,12 +125,12 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
       cars, episode, lanes, sight: of the environment.
       distances: `Distances`.
       boxes: as in `Watch`.
-      settings: `envs.highway.Settings`.
+      settings: `envs.highway.ego.Settings`.
       chosen: those who matter are in `past.near` already, the first `episode.near`.
-      nearest, soonest: as in `shield.controller.find_danger`.
+      nearest, soonest: as in `shield.lanes.controller.find_danger`.
 
     Returns:
-      `shield.lane_frame.Bend` under the ego.
+      `shield.lanes.frame.Bend` under the ego.
     """
     frames, past, ego, dt = distances.frames, distances.past, cars[episode.ego], settings.dt
     episode.turn = _row(episode, 1)

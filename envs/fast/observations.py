@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled, merged
-from envs.fast.config import COS_H, HEADING, PRESENCE, TIME_TO_COLLISION, VX, VY, X, Y
-from envs.fast.floats import clip, dot, lmap, norm, not_zero
-from envs.fast.sight import locate
-from envs.fast.state import OBSTACLE
+from rss_shield.envs._numpy.floats import clip, dot, lmap, norm, not_zero
+from rss_shield.envs.compiled import compiled, merged
+from rss_shield.envs.fast.config import COS_H, HEADING, PRESENCE, TIME_TO_COLLISION, VX, VY, X, Y
+from rss_shield.envs.fast.sight import locate
+from rss_shield.envs.fast.state import OBSTACLE
 
 _PERCEPTION = 200.0  # `AbstractEnv.PERCEPTION_DISTANCE` [m]
 _BEHIND = -10.0  # twice the length of a car [m]

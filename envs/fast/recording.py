@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.state import CAR
+from rss_shield.envs.fast.state import CAR
 
 
 class Log(NamedTuple):

@@ -6,12 +6,12 @@ within three seconds the one on the lane of lower priority stops, unless it is t
 
 import numpy as np
 
-from envs.fast.compiled import merged
-from envs.fast.floats import dot, norm
-from envs.fast.motion import move
-from envs.fast.network import heading_at, position
-from envs.fast.sight import MOMENTS
-from envs.fast.state import DIRECT, TRAFFIC
+from rss_shield.envs._numpy.floats import dot, norm
+from rss_shield.envs.compiled import merged
+from rss_shield.envs.fast.motion import move
+from rss_shield.envs.fast.sight import MOMENTS
+from rss_shield.envs.fast.state import DIRECT, TRAFFIC
+from rss_shield.envs.roads.network import heading_at, position
 
 _STEP = 0.25  # between the moments looked at [s]
 _LOWEST, _HIGHEST = MOMENTS, MOMENTS + 1  # rows of `sight.futures` after those of the moments

@@ -6,9 +6,9 @@ from highway_env.road.regulation import RegulatedRoad
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from envs.fast.draws import generator_state, load_generator
-from envs.fast.network import Network
-from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, TRAFFIC
+from rss_shield.envs.fast.draws import generator_state, load_generator
+from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
+from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network
 
 
 def show(env, cars: np.ndarray, network: Network, episode: np.ndarray | None = None) -> None:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from envs.fast.compiled import merged
-from envs.fast.config import EXIT, HIGHWAY, INTERSECTION, MERGE, TWO_WAY
-from envs.fast.floats import clip, lmap
-from envs.fast.network import is_on_lane
-from envs.fast.state import DIRECT
+from rss_shield.envs._numpy.floats import clip, lmap
+from rss_shield.envs.compiled import merged
+from rss_shield.envs.fast.config import EXIT, HIGHWAY, INTERSECTION, MERGE, TWO_WAY
+from rss_shield.envs.fast.state import DIRECT
+from rss_shield.envs.roads.network import is_on_lane
 
 _EXIT_DISTANCE = 25.0  # beyond an intersection [m]
 

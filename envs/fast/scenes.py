@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled
-from envs.fast.config import EXIT, HIGHWAY, MERGE, ROUNDABOUT, TWO_WAY
-from envs.fast.draws import integers, normal, random, uniform
-from envs.fast.drivers import speed_to_index
-from envs.fast.motion import set_heading
-from envs.fast.network import closest_lane, heading_at, local_coordinates, position
-from envs.fast.state import CAR_LENGTH, CAR_WIDTH, DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
+from rss_shield.envs.compiled import compiled
+from rss_shield.envs.fast.config import EXIT, HIGHWAY, MERGE, ROUNDABOUT, TWO_WAY
+from rss_shield.envs.fast.draws import integers, normal, random, uniform
+from rss_shield.envs.fast.drivers import speed_to_index
+from rss_shield.envs.fast.motion import set_heading
+from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
+from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, closest_lane, heading_at, local_coordinates, position
 
 
 @compiled

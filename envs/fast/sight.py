@@ -11,15 +11,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from envs.fast.compiled import merged
-from envs.fast.floats import wrap_to_pi
-from envs.fast.network import CIRCULAR, around, beside, distance, heading_at, is_far, is_on_lane, local_coordinates
-from envs.fast.state import CAR, CAR_LENGTH
-from envs.fast.ufuncs import arctan2_each
-from envs.intent import CAR_ON_ROAD
-from shield.junction import SAMPLE
-from shield.pair import ROAD_USER
-from shield.plans import THREAT
+from rss_shield.envs._numpy.floats import wrap_to_pi
+from rss_shield.envs._numpy.ufuncs import arctan2_each
+from rss_shield.envs.compiled import merged
+from rss_shield.envs.fast.state import CAR
+from rss_shield.envs.roads.network import (
+    CAR_LENGTH,
+    CIRCULAR,
+    around,
+    beside,
+    distance,
+    heading_at,
+    is_far,
+    is_on_lane,
+    local_coordinates,
+)
+from rss_shield.envs.roads.ways import CAR_ON_ROAD
+from rss_shield.shield.junctions.controller import SAMPLE
+from rss_shield.shield.junctions.plans import THREAT
+from rss_shield.shield.lanes.pair import ROAD_USER
 
 _WAYS = 8  # ways of one road user that there is room for
 MOMENTS = 11  # at which a regulated road looks ahead

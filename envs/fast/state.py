@@ -6,8 +6,8 @@ structured arrays are arrays: `cars["x"]` is `[E, N]`.
 
 import numpy as np
 
-from envs.fast.draws import GENERATOR
-from shield.comfort import Comfort
+from rss_shield.envs.fast.draws import GENERATOR
+from rss_shield.shield.comfort import Comfort
 
 # kinds of road users
 TRAFFIC = 0  # `IDMVehicle`
@@ -15,7 +15,6 @@ META = 1  # `MDPVehicle`, driven by meta-actions
 DIRECT = 2  # `Vehicle`, driven by acceleration and steering
 OBSTACLE = 3  # `Obstacle`
 
-CAR_LENGTH, CAR_WIDTH = 5.0, 2.0  # of every vehicle of highway-env [m]
 OBSTACLE_SIZE = 2.0  # [m]
 
 CAR = np.dtype(
@@ -88,7 +87,7 @@ EPISODE = np.dtype(
         ("broken_duties", "i8"),
         ("cost", "f8"),
         ("min_ttc", "f8"),  # [s]
-        ("blame", "i8"),  # 0 before a contact, then 1 + index into `shield.blame.VERDICTS`
+        ("blame", "i8"),  # 0 before a contact, then 1 + index into `shield.lanes.judge.VERDICTS`
         ("blame_partner", "i8"),
         ("blame_axes", "i8"),
         ("blame_frames", "i8"),  # from the danger threshold to the contact

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from envs.fast.compiled import compiled
-from envs.fast.draws import integers, normal, random, two_of, uniform
-from envs.fast.floats import norm
-from envs.fast.frame import act, look_around, survey, think
-from envs.fast.network import heading_at, local_coordinates, position
-from envs.fast.scenes import add_ego, add_on_lane
-from envs.fast.sight import sort_along_x
+from rss_shield.envs._numpy.floats import norm
+from rss_shield.envs.compiled import compiled
+from rss_shield.envs.fast.draws import integers, normal, random, two_of, uniform
+from rss_shield.envs.fast.frame import act, look_around, survey, think
+from rss_shield.envs.fast.scenes import add_ego, add_on_lane
+from rss_shield.envs.fast.sight import sort_along_x
+from rss_shield.envs.roads.network import heading_at, local_coordinates, position
 
 _CLEARANCE = 15.0  # of a new car to all others [m]
 _EGO_CLEARANCE = 20.0  # others are removed within it [m]

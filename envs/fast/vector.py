@@ -7,12 +7,12 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from envs.arguments import seed_of, whole
-from envs.fast.config import Scenario
-from envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
-from envs.fast.infos import info_of, step_infos
-from envs.fast.recording import Recording
-from envs.highway import Settings
+from rss_shield.envs.arguments import seed_of, whole
+from rss_shield.envs.fast.config import Scenario
+from rss_shield.envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
+from rss_shield.envs.fast.infos import info_of, step_infos
+from rss_shield.envs.fast.recording import Recording
+from rss_shield.envs.options import Settings
 
 _MODES = {
     AutoresetMode.SAME_STEP: SAME_STEP,

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import choose, compiled, compiled_for_arrays, inner, larger, smaller
-from shield.kinematics import reach, stopping_distance, travel
-from shield.lateral import d_min_no_credit
-from shield.longitudinal import d_min_longitudinal, is_safe_longitudinally
+from rss_shield.shield._numba.compiled import choose, compiled, compiled_for_arrays, inner, larger, smaller
+from rss_shield.shield.definitions.kinematics import reach, stopping_distance, travel
+from rss_shield.shield.definitions.lateral import d_min_no_credit
+from rss_shield.shield.definitions.longitudinal import d_min_longitudinal, is_safe_longitudinally
 
 
 class Motion(NamedTuple):

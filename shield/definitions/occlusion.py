@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import choose, compiled, compiled_for_arrays, larger, smaller
-from shield.kinematics import travel
+from rss_shield.shield._numba.compiled import choose, compiled, compiled_for_arrays, larger, smaller
+from rss_shield.shield.definitions.kinematics import travel
 
 
 class Reasonable(NamedTuple):

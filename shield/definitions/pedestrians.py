@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, compiled_for_arrays, inner
-from shield.kinematics import reach
+from rss_shield.shield._numba.compiled import compiled, compiled_for_arrays, inner
+from rss_shield.shield.definitions.kinematics import reach
 
 
 class Walk(NamedTuple):

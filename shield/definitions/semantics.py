@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, inner, larger, smaller
+from rss_shield.shield._numba.compiled import compiled, inner, larger, smaller
 
 NONE, BEHIND, AHEAD = 0, 1, 2  # of whom: nobody, give way, take way
 ACTION_FIELDS = 5

@@ -6,7 +6,7 @@ is not the point. Confidence intervals of the estimates are the caller's: here a
 
 import numpy as np
 
-from shield.compiled import choose, compiled_for_arrays, larger
+from rss_shield.shield._numba.compiled import choose, compiled_for_arrays, larger
 
 MILD, MEDIUM, GROSS = range(3)  # levels of eps in Def. 28
 

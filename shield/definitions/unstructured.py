@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, inner, larger, smaller
-from shield.kinematics import (
+from rss_shield.shield._numba.compiled import compiled, inner, larger, smaller
+from rss_shield.shield.definitions.kinematics import (
     reach,
     response_distance,
     speed_after_response,
@@ -29,7 +29,7 @@ from shield.kinematics import (
     time_to_stop,
     travel,
 )
-from shield.params import RSSParams
+from rss_shield.shield.params import RSSParams
 
 MAX_STEPS = 62  # of an occupancy: one bit each
 LO, HI, RIGHT, LEFT, COS_RIGHT, SIN_RIGHT, COS_LEFT, SIN_LEFT, ANEW = range(9)

@@ -3,15 +3,15 @@
 Nothing in `shield/` imports this package.
 """
 
-from shield.risk.classes import KNOWN_SAFE, KNOWN_UNSAFE, STATES, UNKNOWN, classify, steady
-from shield.risk.factors import Factors, driver_factor, road_factor
-from shield.risk.field import SOURCE, field, road_users
-from shield.risk.markings import MARKING, marking, marking_risk
-from shield.risk.scene import SceneRisk, neighbours, scene_risk
-from shield.risk.settings import RiskSettings, assumed
-from shield.risk.standard import SourceRisk, risk_of
-from shield.risk.stays import BandRisk, band_risk
-from shield.risk.surrogates import Surrogates, toward_leader
+from rss_shield.shield.risk.classes import KNOWN_SAFE, KNOWN_UNSAFE, STATES, UNKNOWN, classify, steady
+from rss_shield.shield.risk.factors import Factors, driver_factor, road_factor
+from rss_shield.shield.risk.field import SOURCE, field, road_users
+from rss_shield.shield.risk.markings import MARKING, marking, marking_risk
+from rss_shield.shield.risk.scene import SceneRisk, neighbours, scene_risk
+from rss_shield.shield.risk.settings import RiskSettings, assumed
+from rss_shield.shield.risk.standard import SourceRisk, risk_of
+from rss_shield.shield.risk.stays import BandRisk, band_risk
+from rss_shield.shield.risk.surrogates import Surrogates, toward_leader
 
 __all__ = [
     "KNOWN_SAFE",

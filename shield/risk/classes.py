@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from shield.compiled import compiled
-from shield.risk.settings import RiskSettings
+from rss_shield.shield._numba.compiled import compiled
+from rss_shield.shield.risk.settings import RiskSettings
 
 KNOWN_SAFE, UNKNOWN, KNOWN_UNSAFE = range(3)  # area 1; areas 3 and 4; area 2
 STATES = ("known_safe", "unknown", "known_unsafe")

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple, Self
 
-from shield.risk.ranges import NOT_NEGATIVE, POSITIVE, Range, checked, in_range, one_of
+from rss_shield.shield.risk.ranges import NOT_NEGATIVE, POSITIVE, Range, checked, in_range, one_of
 
 TYPES = ("car", "truck", "motorcycle", "cyclist", "pedestrian")
 VISIBILITIES = ("below_50", "50_to_100", "100_to_200", "above_200")  # [m]

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled, inner
-from shield.risk.factors import Factors, type_factor
-from shield.risk.ranges import NOT_NEGATIVE, POSITIVE, in_range
-from shield.risk.settings import KMH, RADIAL, RiskSettings
+from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield.risk.factors import Factors, type_factor
+from rss_shield.shield.risk.ranges import NOT_NEGATIVE, POSITIVE, in_range
+from rss_shield.shield.risk.settings import KMH, RADIAL, RiskSettings
 
 # Every road user, the ego included.
 SOURCE = np.dtype(

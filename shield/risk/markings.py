@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled
-from shield.risk.ranges import NOT_NEGATIVE, POSITIVE, in_range, one_of
-from shield.risk.settings import RiskSettings
+from rss_shield.shield._numba.compiled import compiled
+from rss_shield.shield.risk.ranges import NOT_NEGATIVE, POSITIVE, in_range, one_of
+from rss_shield.shield.risk.settings import RiskSettings
 
 MARKINGS = ("none", "striped", "solid", "edge")
 _ETA = dict(none="no_marking", striped="striped_marking", solid="solid_marking", edge="road_edge")

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shield.chosen import how_many, which
-from shield.compiled import compiled, inner
-from shield.risk.classes import KNOWN_SAFE, classify
-from shield.risk.markings import marking_risk
-from shield.risk.standard import risk_of
+from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield.chosen import how_many, which
+from rss_shield.shield.risk.classes import KNOWN_SAFE, classify
+from rss_shield.shield.risk.markings import marking_risk
+from rss_shield.shield.risk.standard import risk_of
 
 
 class SceneRisk(NamedTuple):

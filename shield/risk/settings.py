@@ -7,8 +7,8 @@ what stands in for it says "assumed" here and is listed in `ASSUMED`, so that a 
 
 from typing import Any, NamedTuple, Self
 
-from shield.risk.factors import Factors, road_factor
-from shield.risk.ranges import NOT_NEGATIVE, POSITIVE, Range, checked, index_of
+from rss_shield.shield.risk.factors import Factors, road_factor
+from rss_shield.shield.risk.ranges import NOT_NEGATIVE, POSITIVE, Range, checked, index_of
 
 KMH = 1 / 3.6  # [m/s]
 

@@ -8,10 +8,10 @@ standard against itself.
 
 from typing import NamedTuple
 
-from shield.compiled import compiled, inner, larger
-from shield.kinematics import stopping_distance
-from shield.risk.field import bearing, coupling, dsi, dsi_at, energy, force, mass_of, speed_of, virtual_mass
-from shield.risk.settings import CAR, SAME
+from rss_shield.shield._numba.compiled import compiled, inner, larger
+from rss_shield.shield.definitions.kinematics import stopping_distance
+from rss_shield.shield.risk.field import bearing, coupling, dsi, dsi_at, energy, force, mass_of, speed_of, virtual_mass
+from rss_shield.shield.risk.settings import CAR, SAME
 
 
 class SourceRisk(NamedTuple):

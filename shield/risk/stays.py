@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shield.risk.ranges import one_of
-from shield.risk.settings import RiskSettings
+from rss_shield.shield.risk.ranges import one_of
+from rss_shield.shield.risk.settings import RiskSettings
 
 BAND_MODES = ("integral", "excess")
 

@@ -1,15 +1,15 @@
 """The usual measures of criticality beside the field, under the names of CommonRoad-CriMe.
 
-`time_to_collision` (TTC) is the shield's own, in `shield.kinematics`.
+`time_to_collision` (TTC) is the shield's own, in `shield.definitions.kinematics`.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from shield.compiled import compiled
-from shield.geometry import signed_gap
-from shield.kinematics import stopping_distance, time_to_collision
+from rss_shield.shield._numba.compiled import compiled
+from rss_shield.shield.definitions.kinematics import stopping_distance, time_to_collision
+from rss_shield.shield.geometry import signed_gap
 
 
 class Surrogates(NamedTuple):
@@ -51,7 +51,7 @@ def toward_leader(ego, users):
     """`Surrogates` toward the nearest road user ahead whose lane frame box overlaps the ego's way.
 
     Args:
-      ego: `ROAD_USER` record of `shield.pair`.
+      ego: `ROAD_USER` record of `shield.lanes.pair`.
       users: `[N]` likewise, of everybody else.
     """
     lead, gap = -1, np.inf

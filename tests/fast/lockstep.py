@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 from gymnasium import spaces
 
-import envs
-from envs.fast.config import compile_scenario
-from envs.fast.draws import generator_state
-from envs.fast.engine import DISABLED, Engine
-from envs.fast.infos import info_of, step_infos
-from envs.fast.state import OBSTACLE, TRAFFIC
-from envs.stock import drivers_unchanged
+import rss_shield
+from rss_shield.envs.fast.config import compile_scenario
+from rss_shield.envs.fast.draws import generator_state
+from rss_shield.envs.fast.engine import DISABLED, Engine
+from rss_shield.envs.fast.infos import info_of, step_infos
+from rss_shield.envs.fast.state import OBSTACLE, TRAFFIC
+from rss_shield.envs.stock import drivers_unchanged
 
 _NEAREST = ("shield.partner", "shield.min_margin_lon", "shield.min_margin_lat")
 POLICIES = ("random", "faster", "slower")
@@ -55,7 +55,7 @@ def compare(
 
 
 def _compare(env_id, seeds, policy, config, shield, max_steps, until, options) -> Comparison:
-    stock = envs.make(env_id, shield=shield, config=config, **options)
+    stock = rss_shield.make(env_id, shield=shield, config=config, **options)
     settings = stock.settings if shield else None
     engine = Engine(compile_scenario(env_id, config), 1, settings, autoreset=DISABLED)
     largest = {"state": 0.0, "reward": 0.0, "ulps": 0}

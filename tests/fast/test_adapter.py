@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-import envs
-from agents.vec_env import VectorEnvAdapter
+import rss_shield
+from rss_shield.agents.vec_env import VectorEnvAdapter
 
 ENV = "highway-fast-v0"
 
 
 def test_ends_of_episodes_carry_what_sb3_asks_for():
-    env = VectorEnvAdapter(envs.make_vec(ENV, 4, shield=None))
+    env = VectorEnvAdapter(rss_shield.make_vec(ENV, 4, shield=None))
     env.seed(0)
     env.reset()
     for _ in range(40):
@@ -30,7 +30,7 @@ def test_ends_of_episodes_carry_what_sb3_asks_for():
 def test_ppo_learns_on_it():
     from stable_baselines3 import PPO
 
-    env = VectorEnvAdapter(envs.make_vec(ENV, 8))
+    env = VectorEnvAdapter(rss_shield.make_vec(ENV, 8))
     model = PPO("MlpPolicy", env, n_steps=16, batch_size=64, n_epochs=1, seed=0)
     model.learn(256)
     assert model.num_timesteps == 256
@@ -39,4 +39,4 @@ def test_ppo_learns_on_it():
 
 def test_other_autoreset_modes_are_errors():
     with pytest.raises(ValueError, match="autoreset_mode"):
-        VectorEnvAdapter(envs.make_vec(ENV, 1, shield=None, autoreset_mode=AutoresetMode.NEXT_STEP))
+        VectorEnvAdapter(rss_shield.make_vec(ENV, 1, shield=None, autoreset_mode=AutoresetMode.NEXT_STEP))

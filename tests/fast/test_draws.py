@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from numba import njit
 
-from envs.fast.draws import GENERATOR, generator_state, integers, load_generator, normal, random, two_of, uniform
+from rss_shield.envs.fast.draws import (
+    GENERATOR,
+    generator_state,
+    integers,
+    load_generator,
+    normal,
+    random,
+    two_of,
+    uniform,
+)
 
 
 @njit

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
 
-from envs.fast.floats import dot, norm
+from rss_shield.envs._numpy.floats import dot, norm
 
 KERNELS = {"": "", "Haswell": "avx2", "SkylakeX": "avx512f"}  # of numpy's linear algebra library: what they need
 VECTORS = np.random.default_rng(1).normal(size=(1000, 2, 2)) * 10.0

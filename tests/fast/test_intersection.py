@@ -8,9 +8,9 @@ from gymnasium.vector import AutoresetMode
 from highway_env.vehicle.behavior import IDMVehicle
 from lockstep import compare
 
-import envs
-from envs.fast.config import Unsupported, compile_scenario
-from envs.fast.engine import DISABLED, Engine
+import rss_shield
+from rss_shield.envs.fast.config import Unsupported, compile_scenario
+from rss_shield.envs.fast.engine import DISABLED, Engine
 
 ENV = "intersection-v0"
 LONG = int(os.environ.get("PARITY_EPISODES", "2"))  # episodes per case
@@ -47,7 +47,7 @@ def test_overridden_defaults_agree_to_the_last_bit(policy, config):
 
 def test_the_same_seeds_give_the_same_episodes():
     def rollout(threads):
-        env = envs.make_vec(ENV, 5, shield=None, threads=threads)
+        env = rss_shield.make_vec(ENV, 5, shield=None, threads=threads)
         rng = np.random.default_rng(0)
         seen = [env.reset(seed=3)[0]]
         for _ in range(30):
@@ -114,8 +114,8 @@ def test_an_unsupported_feature_is_named(env_id, config, named):
 def test_free_steering_under_a_shield_is_left_to_the_original():
     config = {"action": {"type": "ContinuousAction"}}
     with pytest.raises(Unsupported, match="ContinuousAction with a shield where roads cross; expected backend"):
-        envs.make_vec(ENV, 1, config=config)
-    assert envs.make_vec(ENV, 1, shield=None, config=config).num_envs == 1
+        rss_shield.make_vec(ENV, 1, config=config)
+    assert rss_shield.make_vec(ENV, 1, shield=None, config=config).num_envs == 1
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_free_steering_under_a_shield_is_left_to_the_original():
     ],
 )
 def test_no_contact_is_the_egos_fault_or_unexplained(env_id, seed, options, verdict, duty):
-    batch = envs.make_vec(env_id, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
+    batch = rss_shield.make_vec(env_id, 1, autoreset_mode=AutoresetMode.DISABLED, **options)
     batch.reset(seed=seed)
     faster, over = np.array([2 if env_id != "roundabout-v0" else 3]), False
     while not over:

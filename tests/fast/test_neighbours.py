@@ -4,15 +4,15 @@ import numba
 import numpy as np
 import pytest
 
-from envs.fast.config import compile_scenario
-from envs.fast.engine import Engine
-from envs.fast.frame import survey
-from envs.fast.guard import make_watch
-from envs.fast.neighbours import Distances, Past, make_past, measure, row_before, start_past
-from envs.highway import Settings
-from shield.controller import find_danger
-from shield.params import PRESETS, Rules
-from shield.response import MEMORY
+from rss_shield.envs.fast.config import compile_scenario
+from rss_shield.envs.fast.engine import Engine
+from rss_shield.envs.fast.frame import survey
+from rss_shield.envs.fast.guard import make_watch
+from rss_shield.envs.fast.neighbours import Distances, Past, make_past, measure, row_before, start_past
+from rss_shield.envs.options import Settings
+from rss_shield.shield.lanes.controller import find_danger
+from rss_shield.shield.lanes.memory import MEMORY
+from rss_shield.shield.params import PRESETS, Rules
 
 DT = 0.2
 FRAMES = 8

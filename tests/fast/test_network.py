@@ -4,8 +4,8 @@ import numba
 import numpy as np
 import pytest
 
-import envs
-from envs.fast.network import compile_network, distance, is_far, local_coordinates
+import rss_shield
+from rss_shield.envs.roads.network import compile_network, distance, is_far, local_coordinates
 
 _is_far = numba.njit(lambda lane, x, y, across, along: is_far(lane, x, y, across, along))
 _distance = numba.njit(lambda lane, s, lateral: distance(lane, s, lateral))
@@ -13,7 +13,7 @@ _distance = numba.njit(lambda lane, s, lateral: distance(lane, s, lateral))
 
 @pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0", "merge-v0"])
 def test_who_is_far_from_a_lane_is_so_in_its_coordinates(env_id):
-    env = envs.make(env_id)
+    env = rss_shield.make(env_id)
     env.reset(seed=0)
     lanes = compile_network(env.unwrapped.road.network, False).lanes
     rng = np.random.default_rng(0)

@@ -11,7 +11,7 @@ import pytest
 from lockstep import POLICIES, compare
 from parity import BARE
 
-import envs
+import rss_shield
 
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
 ENVIRONMENTS = [env_id for env_id in BARE if env_id != "highway-v0"]
@@ -56,7 +56,7 @@ def test_known_routes_are_read_at_the_same_moment(env_id, seeds):
 def test_who_drives_around_a_ring_is_expected_to_leave_it():
     tallies = []
     for backend in ("fast", "highway-env"):
-        env = envs.make_vec("roundabout-v0", 1, backend=backend, intent="known")
+        env = rss_shield.make_vec("roundabout-v0", 1, backend=backend, intent="known")
         env.reset(seed=4400)
         infos = [env.step(np.array([action]))[4] for action in (1, 0, 0, 1, 3, 1, 0, 2, 1, 2)]
         tallies.append([(i["episode_dangerous_pairs"].item(), i["episode_broken_duties"].item()) for i in infos])

@@ -4,9 +4,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import envs
-from envs.fast.replay import read, show
-from envs.stock import drivers_unchanged
+import rss_shield
+from rss_shield.envs.fast.replay import read, show
+from rss_shield.envs.stock import drivers_unchanged
 
 ENV = "highway-fast-v0"
 
@@ -18,7 +18,7 @@ def _drivers_unchanged():
 
 
 def test_chosen_environments_are_recorded_frame_by_frame():
-    env = envs.make_vec(ENV, 3, shield=None)
+    env = rss_shield.make_vec(ENV, 3, shield=None)
     env.reset(seed=0)
     env.recording.choose([2])
     while not env.recording.finished:
@@ -35,7 +35,7 @@ def test_chosen_environments_are_recorded_frame_by_frame():
 
 @pytest.mark.parametrize("env_id", [ENV, "merge-v0", "exit-v0", "roundabout-v0", "intersection-v0"])
 def test_a_loaded_state_goes_on_like_the_engine(env_id):
-    fast = envs.make_vec(env_id, 1, shield=None)
+    fast = rss_shield.make_vec(env_id, 1, shield=None)
     fast.reset(seed=4)
     fast.step(np.array([1]))
     stock = gym.make(env_id).unwrapped
@@ -53,7 +53,7 @@ def test_a_state_of_highway_env_goes_on_in_the_engine(env_id):
     stock = gym.make(env_id).unwrapped
     stock.reset(seed=11)
     stock.step(1)
-    fast = envs.make_vec(env_id, 1, shield=None)
+    fast = rss_shield.make_vec(env_id, 1, shield=None)
     fast.reset(seed=0)
     batch = fast.engine.batch
     read(stock, batch.cars[0], batch.episodes[0], batch.order[0], fast.scenario.network)

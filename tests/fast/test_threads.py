@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from envs.fast.threads import Crew
+from rss_shield.envs.fast.threads import Crew
 
 
 @pytest.fixture(params=[1, 2, 5])

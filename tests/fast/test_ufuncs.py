@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from envs.fast import ufuncs
+from rss_shield.envs._numpy import ufuncs
 
 ONE = {np.tan: ufuncs.tan, np.arctan: ufuncs.arctan, np.arcsin: ufuncs.arcsin}
 ONE_OF_TWO = {np.arctan2: ufuncs.arctan2, np.power: ufuncs.power}

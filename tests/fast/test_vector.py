@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-import envs
-from envs.fast.config import Unsupported, compile_scenario
-from envs.fast.drivers import SLOWER
-from envs.stock import LONGEST_EPISODE
-from shield.params import Rules
+import rss_shield
+from rss_shield.envs.fast.config import Unsupported, compile_scenario
+from rss_shield.envs.fast.drivers import SLOWER
+from rss_shield.envs.stock import LONGEST_EPISODE
+from rss_shield.shield.params import Rules
 
 ENV = "highway-fast-v0"
 
 
 def _rollout(steps=12, num_envs=6, env_id=ENV, **options):
-    env = envs.make_vec(env_id, num_envs, **options)
+    env = rss_shield.make_vec(env_id, num_envs, **options)
     rng = np.random.default_rng(0)
     seen = [env.reset(seed=7)[0]]
     infos = []
@@ -52,7 +52,7 @@ def test_results_do_not_depend_on_the_number_of_threads():
 
 def test_an_environment_does_not_depend_on_its_neighbours():
     many, _ = _rollout(5, 6)
-    few = envs.make_vec(ENV, 2)
+    few = rss_shield.make_vec(ENV, 2)
     observations, _ = few.reset(seed=7)
     assert np.array_equal(observations, many[0][:2])
 
@@ -60,14 +60,14 @@ def test_an_environment_does_not_depend_on_its_neighbours():
 @pytest.mark.parametrize("backend", ["fast", "highway-env"])
 def test_an_episode_that_highway_env_would_never_end_is_truncated(backend):
     creep = {"action": {"type": "DiscreteMetaAction", "target_speeds": [0, 1, 2]}}
-    env = envs.make_vec("merge-v0", 1, backend=backend, config=creep)
+    env = rss_shield.make_vec("merge-v0", 1, backend=backend, config=creep)
     env.reset(seed=0)
     ends = [np.concatenate(env.step(np.array([SLOWER]))[2:4]).tolist() for _ in range(LONGEST_EPISODE)]
     assert ends == [[False, False]] * (LONGEST_EPISODE - 1) + [[False, True]]
 
 
 def test_seeds_may_be_given_one_by_one():
-    env = envs.make_vec(ENV, 3, shield=None)
+    env = rss_shield.make_vec(ENV, 3, shield=None)
     observations, _ = env.reset(seed=[5, 5, 6])
     assert np.array_equal(observations[0], observations[1])
     assert not np.array_equal(observations[0], observations[2])
@@ -84,7 +84,7 @@ def _until_an_end(env, action=3):
 
 
 def test_same_step_autoreset_returns_the_first_observation_of_the_next_episode():
-    env = envs.make_vec(ENV, 3, shield=None)
+    env = rss_shield.make_vec(ENV, 3, shield=None)
     observations, _, ended, infos = _until_an_end(env)
     e = np.flatnonzero(ended)[0]
     assert env.engine.batch.episodes["steps"][e] == 0
@@ -95,7 +95,7 @@ def test_same_step_autoreset_returns_the_first_observation_of_the_next_episode()
 
 
 def test_next_step_autoreset_spends_a_step_on_the_reset():
-    env = envs.make_vec(ENV, 3, shield=None, autoreset_mode=AutoresetMode.NEXT_STEP)
+    env = rss_shield.make_vec(ENV, 3, shield=None, autoreset_mode=AutoresetMode.NEXT_STEP)
     _, _, ended, infos = _until_an_end(env)
     assert "final_info" not in infos
     _, rewards, terminated, truncated, _ = env.step(np.full(3, 1))
@@ -105,7 +105,7 @@ def test_next_step_autoreset_spends_a_step_on_the_reset():
 
 
 def test_disabled_autoreset_leaves_resets_to_the_caller():
-    env = envs.make_vec(ENV, 3, shield=None, autoreset_mode=AutoresetMode.DISABLED)
+    env = rss_shield.make_vec(ENV, 3, shield=None, autoreset_mode=AutoresetMode.DISABLED)
     observations, _, ended, _ = _until_an_end(env)
     fresh, _ = env.reset(options={"reset_mask": ended})
     steps = env.engine.batch.episodes["steps"]
@@ -115,7 +115,7 @@ def test_disabled_autoreset_leaves_resets_to_the_caller():
 
 
 def test_infos_of_one_environment_are_plain_values():
-    env = envs.make_vec(ENV, 2)
+    env = rss_shield.make_vec(ENV, 2)
     env.reset(seed=3)
     env.step(np.array([3, 3]))
     info = env.info(1)
@@ -145,16 +145,16 @@ def test_an_unsupported_feature_is_named(env_id, config, named):
 
 def test_unknown_names_are_errors():
     with pytest.raises(ValueError, match="backend"):
-        envs.make_vec(ENV, 1, backend="slow")
+        rss_shield.make_vec(ENV, 1, backend="slow")
     with pytest.raises(ValueError, match="shield"):
-        envs.make_vec(ENV, 1, shield="off")
+        rss_shield.make_vec(ENV, 1, shield="off")
     with pytest.raises(ValueError, match="signalised-intersection-v0"):
-        envs.make_vec("signalised-intersection-v0", 1, shield="override")
+        rss_shield.make_vec("signalised-intersection-v0", 1, shield="override")
 
 
 def test_an_intervention_penalty_is_taken_from_the_reward():
     def total(penalty):
-        env = envs.make_vec(ENV, 4, intervention_penalty=penalty, rules=Rules(anticipation=0.0))
+        env = rss_shield.make_vec(ENV, 4, intervention_penalty=penalty, rules=Rules(anticipation=0.0))
         env.reset(seed=0)
         rewards, fractions = 0.0, 0.0
         for _ in range(3):
@@ -171,7 +171,7 @@ def test_an_intervention_penalty_is_taken_from_the_reward():
 @pytest.mark.parametrize("backend", ["fast", "highway-env"])
 def test_a_penalty_may_be_charged_by_the_size_of_the_change(backend):
     def reward(penalty):
-        env = envs.make_vec(ENV, 2, intervention_penalty=penalty, penalty_on="change", backend=backend)
+        env = rss_shield.make_vec(ENV, 2, intervention_penalty=penalty, penalty_on="change", backend=backend)
         env.reset(seed=0)
         return env.step(np.full(2, 3))
 
@@ -184,17 +184,17 @@ def test_a_penalty_may_be_charged_by_the_size_of_the_change(backend):
 @pytest.mark.parametrize("name", ["num_envs", "threads"])
 def test_counts_below_one_are_errors(name):
     with pytest.raises(ValueError, match=f"{name} = 0: expected a whole number >= 1"):
-        envs.make_vec(**({"env_id": ENV, "num_envs": 2} | {name: 0}))
+        rss_shield.make_vec(**({"env_id": ENV, "num_envs": 2} | {name: 0}))
 
 
 def test_a_bad_penalty_is_an_error():
     with pytest.raises(ValueError, match="intervention_penalty"):
-        envs.make_vec(ENV, 2, intervention_penalty=-1.0)
+        rss_shield.make_vec(ENV, 2, intervention_penalty=-1.0)
 
 
 @pytest.mark.parametrize("actions", [[1, 5], [-1, 1], [0.5, 1.0]])
 def test_actions_outside_the_space_are_errors(actions):
-    env = envs.make_vec(ENV, 2, shield=None)
+    env = rss_shield.make_vec(ENV, 2, shield=None)
     env.reset(seed=0)
     with pytest.raises(ValueError, match="integers from 0 to 4"):
         env.step(np.array(actions))
@@ -202,7 +202,7 @@ def test_actions_outside_the_space_are_errors(actions):
 
 @pytest.mark.parametrize("actions", [[[0.0, np.nan], [0.0, 0.0]], [[0.0], [0.0]]])
 def test_continuous_actions_must_be_finite_and_of_the_right_shape(actions):
-    env = envs.make_vec(ENV, 2, shield=None, config={"action": {"type": "ContinuousAction"}})
+    env = rss_shield.make_vec(ENV, 2, shield=None, config={"action": {"type": "ContinuousAction"}})
     env.reset(seed=0)
     with pytest.raises(ValueError, match="finite numbers"):
         env.step(np.array(actions, np.float32))
@@ -217,7 +217,7 @@ def test_both_backends_start_on_the_same_lane(lane, lanes):
         "initial_lane_id": lane,
         "observation": {"type": "Kinematics", "features": ["x", "y"], "absolute": True, "normalize": False},
     }
-    fast, stock = (envs.make_vec(ENV, 2, shield=None, backend=b, config=config) for b in ("fast", "highway-env"))
+    fast, stock = (rss_shield.make_vec(ENV, 2, shield=None, backend=b, config=config) for b in ("fast", "highway-env"))
     for seed in range(3):
         start = fast.reset(seed=seed)[0]
         np.testing.assert_array_equal(start, stock.reset(seed=seed)[0])
@@ -261,7 +261,7 @@ def _same_infos(ours, theirs, path="", reset=None):
 )
 def test_both_backends_say_the_same(env_id, shield, config, mode):
     fast, stock = (
-        envs.make_vec(env_id, 3, shield=shield, backend=b, config=config, autoreset_mode=mode)
+        rss_shield.make_vec(env_id, 3, shield=shield, backend=b, config=config, autoreset_mode=mode)
         for b in ("fast", "highway-env")
     )
     begins = np.ones(3, bool)

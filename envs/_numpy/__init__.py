@@ -1,0 +1,1 @@
+"""What the engine computes as numpy does, to the last bit."""

@@ -1,0 +1,1 @@
+"""The shield on highway-env's own objects."""

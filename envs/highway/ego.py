@@ -1,0 +1,501 @@
+"""highway-env objects to shield arrays and back: the only reader of highway-env's internals."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
+from highway_env.vehicle.objects import Landmark
+
+from rss_shield.envs.options import LANES, Settings
+from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, road_through, tightest
+from rss_shield.envs.roads.steering import MAX_SLIP
+from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
+from rss_shield.shield.command import Command
+from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
+from rss_shield.shield.lanes.controller import (
+    Body,
+    Response,
+    find_danger,
+    respond,
+)
+from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
+from rss_shield.shield.lanes.judge import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
+from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
+from rss_shield.shield.lanes.memory import AXES, MEMORY, catch_up, forget_safe
+from rss_shield.shield.lanes.pair import ROAD_USER, assess
+
+# of a car that had its contact before there was a shield on it
+EARLIER_CONTACT = {
+    "verdict": "inherited",
+    "partner": -1,
+    "danger": "inherited",
+    "seconds_since_threshold": 0.0,
+    "ego_duty": "",
+    "ego_excess": 0.0,
+    "other_duty": "",
+    "other_excess": 0.0,
+}
+
+
+class Frame(NamedTuple):
+    """One recorded frame: everything the shield saw, and the command that was executed."""
+
+    keys: tuple[int, ...]  # `[N]` identity of each user within the episode
+    poses: np.ndarray  # `[N + 1, 4]` x, y, heading, speed in the world, the ego last
+    command: Command
+    # in the lane frame of the ego, which nothing is measured in where roads cross
+    ego: np.ndarray | None = None  # `ROAD_USER`, 0-d
+    users: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` `ROAD_USER`
+    curvature: float = 0.0  # of the lane under the ego [1/m]
+    jumped: tuple[bool, ...] = ()  # `[N]` a user was moved in the lane frame, or with it
+    ego_before: np.ndarray | None = None  # `ROAD_USER` on the frame before, in the lane frame of this one
+    users_before: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` likewise
+
+
+def log_of(frames: list[Frame]) -> Log:
+    """Recorded frames as the arrays that `shield.lanes.judge.audit` reads."""
+    count = 1 + max((max(frame.keys, default=-1) for frame in frames), default=-1)
+    users, before = np.zeros((2, len(frames), count), ROAD_USER)
+    present, jumped = np.zeros((2, len(frames), count), bool)
+    for t, frame in enumerate(frames):
+        keys = list(frame.keys)
+        users[t, keys], before[t, keys] = frame.users, frame.users_before
+        present[t, keys], jumped[t, keys] = True, frame.jumped
+    return Log(
+        ego=np.array([frame.ego for frame in frames], ROAD_USER),
+        users=users,
+        present=present,
+        acceleration=np.array([frame.command.acceleration for frame in frames]),
+        slip=np.array([frame.command.slip for frame in frames]),
+        curvature=np.array([frame.curvature for frame in frames], float),
+        jumped=jumped,
+        ego_before=np.array([frame.ego_before for frame in frames], ROAD_USER),
+        users_before=before,
+    )
+
+
+# ---------------------------------------------------------------- one ego under the shield
+
+
+class StepTally:
+    """What happened in one decision step, frame by frame."""
+
+    def __init__(self) -> None:
+        self.frames = self.overridden = self.anticipated = self.limited = 0
+        self.dangerous_pairs = self.broken_duties = 0
+        self.acceleration_change = self.steering_change = 0.0  # largest
+        self.acceleration_changed = self.steering_changed = 0.0  # sums over the frames
+        self.lane_change_refused = False
+        self.margin_lon = self.margin_lat = float("inf")
+        self.partner = -1
+        self.response = 0
+
+
+class ShieldedEgo:
+    """The shield on one controlled vehicle. It takes the place of the vehicle's `act`.
+
+    highway-env calls `act()` without an argument once per frame, when every vehicle chooses its
+    command and none has moved: the state is consistent. The bound method lives in the vehicle's
+    own `__dict__`, so a deep copy or a pickle of the environment carries its own shield along.
+    """
+
+    is_ego = False  # of a wrapper, which reads its infos; else of a car of compliant traffic
+
+    def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
+        self.vehicle = vehicle
+        self.settings = settings
+        self.body = (vehicle.LENGTH / 2, MAX_SLIP)
+        self.backs_up = not isinstance(vehicle, ControlledVehicle)  # drivers that keep a speed never ask for it
+        self.nominal = dict(vehicle.action)
+        self.others: list = []
+        self.keys: list[int] = []
+        self.seen = 0
+        self.memory = np.zeros(0, MEMORY)
+        self.poses = np.zeros((0, 4))
+        self.poses_before = np.zeros((0, 4))  # one frame ago
+        self.before = np.zeros((0, 2))  # positions one frame before `poses`
+        self.earlier = np.zeros((0, 2))  # and before `poses_before`
+        self.boxes = np.zeros((0, 4))
+        self.last = (np.zeros(1, ROAD_USER)[0], np.zeros(0, ROAD_USER))  # ego and others on the frame before
+        self.roads: dict = {}
+        self.heading: Heading | None = None
+        self.road = np.zeros((0, PIECE_FIELDS))  # that the ego is measured along
+        self.branches = self.road  # and everybody else
+        self.jumped = np.zeros(0, bool)
+        self.contact: dict | None = None
+        self.frames = self.frames_overridden = self.frames_anticipated = self.frames_limited = 0
+        self.acceleration_changed = self.steering_changed = 0.0
+        self.rooms = (float("inf"), float("inf"))  # to the left and to the right, beside who is alongside [m]
+        self.ride = np.zeros(1, RIDE)[0]
+        self.dangerous_pairs = self.broken_duties = 0
+        self.cost = 0.0
+        self.min_ttc = float("inf")
+        self.tally = StepTally()
+        self.record: list[Frame] | None = [] if record else None
+        self.meter: Any = None  # `RiskMeter` that looks on after each frame
+        self.judge = self  # or another, which watches by a table of its own
+        vehicle.act = self.act
+
+    def go_on_from(self, former: "ShieldedEgo") -> None:
+        """Take the place of another car: what counts since reset goes on."""
+        self.frames, self.frames_overridden = former.frames, former.frames_overridden
+        self.dangerous_pairs, self.broken_duties = former.dangerous_pairs, former.broken_duties
+        self.cost, self.min_ttc = former.cost, former.min_ttc
+        if self.judge is not self:
+            self.judge.go_on_from(former.judge)
+
+    # -- called by highway-env
+
+    def act(self, action=None) -> None:
+        vehicle = self.vehicle
+        before = getattr(vehicle, "target_lane_index", None)
+        type(vehicle).act(vehicle, action)
+        if action is not None:
+            self.nominal = dict(vehicle.action)
+            self._refuse_lane_change(before)
+        elif not self.check_contact():
+            self._frame()
+            if self.judge is not self:
+                self.judge.watch()
+            if self.meter is not None:
+                self.meter.look(self)
+
+    def watch(self) -> None:
+        """Take in a frame on which another shield has decided."""
+        self.nominal = dict(self.vehicle.action)
+        self._frame()
+
+    def _frame(self) -> None:
+        vehicle, settings = self.vehicle, self.settings
+        # meta-actions compute a new command on every frame, a continuous one persists
+        nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
+        steering = float(nominal["steering"])  # single precision where the agent's action is
+        self._meet()
+        users, ego, bend = self._sense()
+        wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
+        rules = settings.ego, settings.other, settings.rules, settings.dt
+        danger = find_danger(ego, users, *self.last, self.memory, *rules)
+        self.rooms = danger.room_left, danger.room_right
+        response = Response(wish, False, False, False)
+        if settings.overrides:
+            body = Body(*self.body, bend.curvature, bend.slack, self.backs_up)
+            response = respond(self._taken_back(wish, ego, body), danger, ego, body, settings.rules, settings.dt)
+        command = response.command
+        pairs, broken = judge_frame(
+            ego, users, self.memory, command, bend.curvature, settings.ego, settings.other, settings.dt
+        )
+        steered = steering
+        if command != wish:
+            if command.slip != wish.slip:
+                steered = float(np.arctan(2.0 * np.tan(command.slip)))
+            vehicle.action = {"steering": steered, "acceleration": command.acceleration}
+        elif vehicle.action is not nominal and settings.overrides:
+            vehicle.action = dict(nominal)
+        before, self.last = self.last, (ego, users)
+        changes = command.acceleration - wish.acceleration, steered - steering
+        self._count(danger, response, response.anticipated, pairs, broken, *changes)
+        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.dt)
+        tally = self.tally
+        if max(danger.margin_lon, danger.margin_lat) < max(tally.margin_lon, tally.margin_lat):
+            tally.margin_lon, tally.margin_lat = danger.margin_lon, danger.margin_lat
+            tally.partner = self._index_on_road(danger.partner)
+        if self.record is not None:
+            seen = ego, users, bend.curvature, tuple(self.jumped), *before
+            self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
+
+    def _count(
+        self,
+        danger,
+        response,
+        anticipated: bool,
+        pairs: int,
+        broken: int,
+        acceleration_change: float,
+        steering_change: float,
+    ) -> None:
+        tally, overrides = self.tally, self.settings.overrides
+        tally.frames += 1
+        tally.overridden += response.overridden and overrides
+        tally.anticipated += anticipated and overrides
+        tally.limited += response.limited and overrides
+        tally.dangerous_pairs += pairs
+        tally.broken_duties += broken
+        tally.acceleration_change = max(tally.acceleration_change, abs(acceleration_change))
+        tally.steering_change = max(tally.steering_change, abs(float(steering_change)))
+        tally.acceleration_changed += abs(acceleration_change)
+        tally.steering_changed += abs(float(steering_change))
+        tally.response |= danger.response
+        self.frames += 1
+        self.frames_overridden += response.overridden and overrides
+        self.frames_anticipated += anticipated and overrides
+        self.frames_limited += response.limited and overrides
+        self.acceleration_changed += abs(acceleration_change)
+        self.steering_changed += abs(float(steering_change))
+        self.dangerous_pairs += pairs
+        self.broken_duties += broken
+        self.min_ttc = min(self.min_ttc, danger.ttc)
+
+    def _index_on_road(self, i: int) -> int:
+        """Index in `road.vehicles`; static objects follow after the vehicles."""
+        road = self.vehicle.road
+        everybody = [*road.vehicles, *road.objects]
+        return next((k for k, other in enumerate(everybody) if other is self.others[i]), -1)
+
+    # -- lane changes
+
+    @property
+    def _takes_back(self) -> bool:
+        return self.settings.overrides and self.settings.rules.take_back and self.settings.scheme == LANES
+
+    def _refuse_lane_change(self, before) -> None:
+        """Ignore the lane change that the agent asks for, if it is blocked or comes half-way through another."""
+        vehicle = self.vehicle
+        if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.contact is not None:
+            return
+        target = vehicle.target_lane_index
+        if target == before or target[:2] != before[:2]:
+            return
+        back = turns_back(self._offset(vehicle.lane_index), self._offset(before), target[2] - before[2])
+        if back or self._is_blocked(target):
+            vehicle.target_lane_index = before
+            self.tally.lane_change_refused = True
+
+    def _is_blocked(self, index) -> bool:
+        """Is the way to the centre of a lane blocked?"""
+        return bool(is_blocked(self._offset(index), *self.rooms))
+
+    def _offset(self, index) -> float:
+        """Offset from the centre of a lane, positive to the right [m]."""
+        return float(self.vehicle.road.network.get_lane(index).local_coordinates(self.vehicle.position)[1])
+
+    def _taken_back(self, wish: Command, ego, body: Body) -> Command:
+        """What the agent wants, unless it is stuck between two lanes; and the lane that it heads for from now on."""
+        vehicle = self.vehicle
+        if not self._takes_back:
+            return wish
+        if not isinstance(vehicle, ControlledVehicle):
+            width = vehicle.lane.width_at(0.0)
+            slip = lead_back(wish.slip, ego, width, *self.rooms, body.half_wheelbase, body.curvature, self.settings.dt)
+            if slip != wish.slip:
+                self.tally.lane_change_refused = True
+            return Command(wish.acceleration, float(slip))
+        if isinstance(vehicle, MDPVehicle):
+            target = self._reachable(vehicle.lane_index, vehicle.target_lane_index)
+            if target != vehicle.target_lane_index:
+                vehicle.target_lane_index = target
+                self.tally.lane_change_refused = True
+        return wish
+
+    def _reachable(self, here, target):
+        """Lane that the ego can get to: its target, one on the way, the one it is on, or the one it has come from."""
+        if target[:2] != here[:2]:
+            return target
+        for i in range(target[2], here[2], 1 if here[2] > target[2] else -1):
+            if not self._is_blocked((*here[:2], i)):
+                return (*here[:2], i)
+        if target != here or not self._is_blocked(here):
+            return here
+        offset = self._offset(here)
+        if abs(offset) <= OFF_CENTRE:
+            return target
+        start, end, i = here
+        i += 1 if offset > 0.0 else -1
+        if not 0 <= i < len(self.vehicle.road.network.graph[start][end]) or self._is_blocked((start, end, i)):
+            return target
+        return start, end, i
+
+    # -- reading the road
+
+    def _sense(self):
+        """Everybody else `[N]` and the ego as `ROAD_USER` records in the lane frame of the ego, and its `Bend`."""
+        self._choose_frame()
+        users, ego = self._measure(self.poses, self.before)
+        self._go_around(users, ego)
+        (x, y, _, speed), dt = self.poses[-1], self.settings.dt
+        bend = look_ahead(self.road, x, y, speed, self.body[0], dt)
+        self.poses_before, self.earlier, self.before = self.poses, self.before, self.poses[:, :2]
+        return users, ego, Bend(*bend)
+
+    def _measure(self, poses, before):
+        """Everybody else `[N]` and the ego as `ROAD_USER` records."""
+        out = np.zeros(len(poses), ROAD_USER)
+        out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in self.others]
+        out["in_own_lane"] = [self._in_own_lane(v) for v in [*self.others, self.vehicle]]
+        dt = self.settings.dt
+        to_lane_frame_all(self.branches, poses[:-1], before[:-1], self.boxes[:-1], dt, out[:-1])
+        to_lane_frame_all(self.road, poses[-1:], before[-1:], self.boxes[-1:], dt, out[-1:])
+        return out[:-1], out[-1]
+
+    def _go_around(self, users, ego) -> None:
+        """On a closed road everybody is ahead and behind: count where the margin is smaller, unless danger lasts.
+
+        In danger who was ahead stays ahead. Where somebody changes places otherwise, the sample before is taken
+        in again from there.
+        """
+        settings = self.settings
+        rules = settings.ego, settings.other, settings.rules, settings.dt
+        ego_before, users_before = self.last[0], self.last[1].copy()
+        for i in np.flatnonzero(np.isfinite(users["around"])):
+            around = users["around"][i]
+            known = self.memory["age"][i] > 0 or self.memory["skipped"][i]
+            gap = users_before["s"][i] - ego_before["s"] if known else 0.0
+            places = ego["s"] + (users["s"][i] - ego["s"]) % around - [0.0, around]
+            follows = int(np.argmin(np.abs(places - ego["s"] - gap)))
+            place = follows
+            if self.memory["since"][i] == 0:
+                margins = []
+                for users["s"][i] in places:
+                    margins.append(assess(ego, users[i], *rules).margin_lon)
+                place = int(np.argmin(margins))
+            users["s"][i] = places[place]
+            if place != follows and known:
+                users_before["s"][i] += places[place] - places[follows]
+                self.jumped[i] = True
+                forget_safe(self.memory[i])
+        self.last = (ego_before, users_before)
+
+    def _meet(self) -> None:
+        """Find out who is on the road, and where."""
+        vehicle = self.vehicle
+        road = vehicle.road
+        users = [*road.vehicles, *(o for o in road.objects if not isinstance(o, Landmark))]
+        # who cannot be touched needs no distance
+        others = [v for v in users if v is not vehicle and v.collidable and vehicle.collidable]
+        if others != self.others or len(self.before) != len(others) + 1:
+            self._follow(others)
+        self.poses = np.array([(*v.position, v.heading, v.speed) for v in [*others, vehicle]], dtype=float)
+
+    def _follow(self, others: list) -> None:
+        """Carry the memory over to a new set of road users, by identity."""
+        old = {id(other): i for i, other in enumerate(self.others)}
+        memory = np.zeros(len(others), MEMORY)
+        poses, before, earlier = (np.full((len(others) + 1, width), np.nan) for width in (4, 2, 2))
+        last = np.zeros(len(others), ROAD_USER)
+        keys = []
+        for i, other in enumerate(others):
+            k = old.get(id(other))
+            if k is None:
+                keys.append(self.seen)
+                self.seen += 1
+            else:
+                memory[i], last[i] = self.memory[k], self.last[1][k]
+                poses[i], before[i], earlier[i] = self.poses_before[k], self.before[k], self.earlier[k]
+                keys.append(self.keys[k])
+        if len(self.before):
+            poses[-1], before[-1], earlier[-1] = self.poses_before[-1], self.before[-1], self.earlier[-1]
+        self.others, self.memory, self.keys = others, memory, keys
+        self.poses_before, self.before, self.earlier = poses, before, earlier
+        self.last = (self.last[0], last)
+        bound, bend = self.settings.rules.heading_bound, tightest(self.vehicle.road.network)
+        self.boxes = np.array([_box(v, bound, bend) for v in [*others, self.vehicle]])
+
+    def _choose_frame(self) -> None:
+        """Measure along the road that the ego drives. Where that jumps, so does the sample before."""
+        self.jumped = np.zeros(len(self.others), bool)
+        heading = heading_of(self.vehicle)
+        if heading == self.heading:
+            return
+        if heading not in self.roads:
+            self.roads[heading] = self._roads_along(heading)
+        road, branches = self.roads[heading]
+        jumps = self.heading is not None and not (same_frame(self.road, road) and same_frame(self.branches, branches))
+        self.heading, self.road, self.branches = heading, road, branches
+        if jumps:
+            self.jumped[:] = True
+            self.last = self._measure_again(*self.last)
+            for memory in self.memory:
+                forget_safe(memory)
+
+    def _measure_again(self, ego_before, users_before):
+        """The ego and everybody else `[N]` on the frame before, in the lane frame of this one."""
+        users, ego = self._measure(self.poses_before, self.earlier)
+        for flag in ("wreck", "in_own_lane"):
+            users[flag], ego[flag] = users_before[flag], ego_before[flag]
+        closed = np.isfinite(users["around"])  # who was ahead is so still
+        around = users["around"][closed]
+        moved = (users_before["s"] - ego_before["s"] - users["s"] + ego["s"])[closed]
+        users["s"][closed] += around * np.round(moved / around)
+        return ego, users
+
+    def _roads_along(self, heading: Heading):
+        """The road that the ego is measured along, and the one with the branches that it may still take."""
+        settings, network = self.settings, self.vehicle.road.network
+        reach = reach_of(settings.ego, settings.other, settings.dt)
+        road = road_through(network, heading.lane, reach, heading.way)
+        return road, road_through(network, heading.lane, reach, *heading[1:]) if heading.beside else road
+
+    def _in_own_lane(self, other) -> bool:
+        """Is a car inside a lane that runs its way? Only asked of oncoming cars."""
+        if other.lane is None or np.cos(other.heading - self.vehicle.heading) > 0.0:
+            return True
+        s, lateral = other.lane.local_coordinates(other.position)
+        along = np.cos(other.heading - other.lane.heading_at(s)) > 0.0
+        return bool(along and abs(lateral) <= (other.lane.width_at(s) - other.WIDTH) / 2)
+
+    # -- contacts
+
+    def check_contact(self) -> bool:
+        """Has the ego touched somebody, or does highway-env predict it for the next frame?
+
+        Judged at the first such sample, before the impact displaces anybody.
+        """
+        vehicle = self.vehicle
+        if self.contact is None and (vehicle.crashed or vehicle.impact is not None):
+            self.contact = self._judge_contact()
+            if self.judge is not self:
+                self.judge.check_contact()
+        return self.contact is not None
+
+    def _judge_contact(self) -> dict | None:
+        self._meet()
+        if not self.others:  # the flag was not raised by a contact
+            return None
+        touching = [i for i, other in enumerate(self.others) if self._touches(other)]
+        if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
+            touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
+        verdicts = self._verdicts(touching)
+        # several at once: the one that weighs most against the ego counts
+        weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
+        i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: weight[VERDICTS[pair[1].verdict]])
+        return {
+            "verdict": VERDICTS[verdict.verdict],
+            "partner": self._index_on_road(i),
+            "danger": self._danger(i, int(verdict.axes)),
+            "seconds_since_threshold": verdict.frames * self.settings.dt,
+            "ego_duty": DUTIES[verdict.ego_duty],
+            "ego_excess": float(verdict.ego_excess),
+            "other_duty": DUTIES[verdict.other_duty],
+            "other_excess": float(verdict.other_excess),
+        }
+
+    def _verdicts(self, touching: list[int]) -> list[Verdict]:
+        settings, memory = self.settings, self.memory
+        rules = settings.ego, settings.other, settings.rules, settings.dt
+        users, ego, _ = self._sense()
+        for i in touching:
+            catch_up(memory[i], self.last[0], self.last[1][i], *rules)
+        return [judge_contact(ego, users[i], memory[i], *rules) for i in touching]
+
+    def _danger(self, i: int, kind: int) -> str:
+        return AXES[kind]
+
+    def _touches(self, other) -> bool:
+        """highway-env's own collision test, in its own order, without its effects."""
+        vehicle = self.vehicle
+        vehicles = vehicle.road.vehicles
+        first, second = vehicle, other
+        if other in vehicles and vehicles.index(other) < vehicles.index(vehicle):
+            first, second = other, vehicle
+        if not (first.check_collisions or second.check_collisions):
+            return False
+        touching, will_touch, _ = first._is_colliding(second, self.settings.dt)
+        return bool(touching or will_touch)
+
+
+def _box(user, heading_bound: float, curvature: float) -> tuple[float, float, float, float]:
+    """Length and width, and the largest half extents that its driver may use; obstacles have no driver [m].
+
+    In a tight bend a car that keeps to its lane is at a larger angle to it than the bound.
+    """
+    bound = max(heading_bound, min(curvature * user.LENGTH / 2, 0.9)) if hasattr(user, "action") else 1.0
+    return user.LENGTH, user.WIDTH, *largest_half_extents(user.LENGTH, user.WIDTH, bound)

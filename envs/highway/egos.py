@@ -1,0 +1,138 @@
+"""Whom a wrapper shields: whichever vehicles are the egos of its environment, at every step."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium as gym
+
+from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
+from rss_shield.envs.highway.ego import EARLIER_CONTACT, ShieldedEgo
+from rss_shield.envs.highway.risk import RiskMeter
+from rss_shield.envs.highway.step import attach, shield_on
+from rss_shield.envs.options import Settings
+from rss_shield.shield.risk import RiskSettings
+
+
+class EgoShields(gym.Wrapper):
+    """What `ShieldWrapper` and `MultiAgentShield` have in common. A shield lies with its vehicle, not here.
+
+    So it is copied with the vehicle, however an environment is copied, and somebody who changes vehicles changes
+    shields. A car that becomes an ego between two steps gets one; what counts since reset goes on.
+    """
+
+    record: bool
+    traffic: str
+    risk: RiskSettings | None
+    _settings: Settings
+    _judge: Settings | None  # what the egos are judged by, where that is not what they are restricted by
+    _egos: list[ShieldedEgo]  # shields of the last step, in the order of the vehicles
+
+    def __init__(self, env: gym.Env) -> None:
+        super().__init__(env)
+        inner: gym.Env = env
+        while isinstance(inner, gym.Wrapper):
+            if isinstance(inner, EgoShields):
+                break
+            inner = inner.env
+        if isinstance(inner, EgoShields) or next(egos_on(env.unwrapped), None) is not None:
+            raise ValueError(f"environment {env} is behind a shield already: expected one that is not (shield=None)")
+
+    @property
+    def settings(self) -> Settings:
+        """The parameter table in force for every ego, response times rounded up to whole frames."""
+        return self._settings
+
+    @property
+    def drivers(self) -> list[ShieldedEgo]:
+        """Shields of the cars that are no egos, in compliant traffic."""
+        env: Any = self.env.unwrapped
+        return drivers_on(env.road)
+
+    def _check(self) -> None:
+        """Can the egos of the environment, as it is now, be shielded?"""
+        raise NotImplementedError
+
+    def _current_settings(self) -> Settings:
+        """Settings for the environment as it is now."""
+        raise NotImplementedError
+
+    def _judge_settings(self) -> Settings | None:
+        """What the egos are judged by, where that is not what they are restricted by."""
+        raise NotImplementedError
+
+    def _begin(self) -> None:
+        """Put new shields on for a new episode."""
+        self._check()
+        self._settings, self._judge = self._current_settings(), self._judge_settings()
+        env: Any = self.env.unwrapped
+        for shield in list(egos_on(env)):
+            _take_off(shield)
+        self._egos = []
+        self._guard()
+
+    def _guard(self) -> list[ShieldedEgo]:
+        """Shields of all egos, and of compliant traffic: who has come to be one since the last step gets one.
+
+        Raises:
+          ValueError: an ego is not on the environment's road, or is behind a shield with other settings.
+        """
+        self._check()
+        env: Any = self.env.unwrapped
+        if self._settings.dt != 1 / env.config["simulation_frequency"]:
+            self._settings, self._judge = self._current_settings(), self._judge_settings()
+        self._egos = [self._shield_of(i, vehicle) for i, vehicle in enumerate(env.controlled_vehicles)]
+        for shield in list(egos_on(env)):
+            if shield not in self._egos:
+                _take_off(shield)
+        if self.traffic == "compliant":
+            shield_everybody(env.road, self._settings)
+        return self._egos
+
+    def _shield_of(self, i: int, vehicle: Any) -> ShieldedEgo:
+        env: Any = self.env.unwrapped
+        if vehicle.road is not env.road or not any(vehicle is one for one in env.road.vehicles):
+            raise ValueError(
+                f"controlled_vehicles[{i}] = {vehicle} is not on the environment's road: expected one of road.vehicles"
+            )
+        shield = shield_on(vehicle)
+        if shield is None or not shield.is_ego:
+            among = self.traffic == "compliant"
+            shield = attach(vehicle, self._settings, self.record, env.config.get("destination"), among, self._judge)
+            shield.is_ego = True
+            shield.meter = RiskMeter(self.risk) if self.risk is not None else None
+            if vehicle.crashed:
+                shield.contact = shield.judge.contact = dict(EARLIER_CONTACT)
+            if env.time > 0.0 and i < len(self._egos):
+                shield.go_on_from(self._egos[i])
+        elif shield.settings != self._settings:
+            raise ValueError(
+                f"controlled_vehicles[{i}] = {vehicle} is behind a shield with other settings: expected one shield "
+                "around an environment, and a reset after a change of its configuration"
+            )
+        return shield
+
+    def _guard_after_step(self, egos: list[ShieldedEgo]) -> list[ShieldedEgo]:
+        """Those who were egos during a step, or if another wrapper has begun a new episode instead, the new ones.
+
+        Raises:
+          ValueError: an ego was replaced in the middle of an episode, so somebody has driven without a shield.
+        """
+        env: Any = self.env.unwrapped
+        if [shield_on(vehicle) for vehicle in env.controlled_vehicles] == egos:
+            return egos
+        if env.time > 0.0:
+            raise ValueError(
+                "controlled_vehicles changed during a step: expected an ego to be replaced between steps, from outside "
+                "of the shield"
+            )
+        return self._guard()
+
+
+def egos_on(env: Any) -> Iterator[ShieldedEgo]:
+    """Shields of egos, also of former ones; those of compliant traffic are not among them."""
+    shields = (shield_on(vehicle) for vehicle in [*env.road.vehicles, *env.controlled_vehicles])
+    return (shield for shield in shields if shield is not None and shield.is_ego)
+
+
+def _take_off(shield: ShieldedEgo) -> None:
+    vars(shield.vehicle).pop("act", None)

@@ -1,0 +1,191 @@
+"""MultiAgentShield: several controlled vehicles, each with a shield of its own."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import RecordConstructorArgs
+from highway_env.envs.common.action import MultiAgentAction
+
+from rss_shield.envs.arguments import actions_of, plain, rules_of, seed_of
+from rss_shield.envs.highway.ego import Frame
+from rss_shield.envs.highway.egos import EgoShields
+from rss_shield.envs.highway.risk import check_risk
+from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of
+from rss_shield.envs.highway.wrapper import traffic_info
+from rss_shield.envs.options import (
+    Params,
+    Settings,
+    check_action_type,
+    check_conduct,
+    check_kind,
+    check_options,
+    check_params,
+    judge_of,
+    settings_for,
+)
+from rss_shield.envs.stock import check_frequencies
+from rss_shield.shield.lanes.judge import Audit
+from rss_shield.shield.params import Rules
+from rss_shield.shield.risk import RiskSettings
+
+
+class MultiAgentShield(EgoShields, RecordConstructorArgs):
+    """`ShieldWrapper` for environments with several agents: each ego has its own shield and sees the others as cars.
+
+    Actions, observations, rewards and ends are the environment's: tuples, or one value for all. Every info has
+
+      agents: for each agent in turn a dict with the keys that `ShieldWrapper` writes: `shield`, `cost`, `blame`,
+        ... Blame is from the agent's own view: where two agents touch, "other" may be the other agent.
+      raw_reward: the environment's own reward or rewards (after a step).
+      traffic_blame: see `ShieldWrapper`; the agents are not among the others.
+
+    Args:
+      env: a highway-env environment with `MultiAgentAction`, such as intersection-multi-agent-v0/-v1/-v2.
+      intervention_penalty: subtracted from each agent's reward, times what `penalty_on` names of its own; from one
+        reward for all, times the mean of that.
+      mode, penalty_on, params, rules, record, entry, intent, waiting, traffic, examine, risk, judge_params,
+        judge_rules: see `ShieldWrapper`.
+
+    Raises:
+      ValueError: as `ShieldWrapper`.
+    """
+
+    def __init__(
+        self,
+        env: gym.Env,
+        mode: str = "override",
+        params: Params = None,
+        intervention_penalty: float = 0.0,
+        penalty_on: str = "response",
+        rules: Rules | Mapping[str, Any] = Rules(),
+        record: bool = False,
+        entry: str = "cautious",
+        intent: str = "any",
+        waiting: str = "line",
+        traffic: str = "stock",
+        examine: str = "table",
+        risk: bool | RiskSettings = False,
+        judge_params: Params = None,
+        judge_rules: Rules | Mapping[str, Any] | None = None,
+    ) -> None:
+        RecordConstructorArgs.__init__(
+            self,
+            mode=mode,
+            params=plain(params),
+            intervention_penalty=plain(intervention_penalty),
+            penalty_on=penalty_on,
+            rules=plain(rules),
+            record=record,
+            entry=entry,
+            intent=intent,
+            waiting=waiting,
+            traffic=traffic,
+            examine=examine,
+            risk=risk,
+            judge_params=plain(judge_params),
+            judge_rules=plain(judge_rules),
+        )
+        check_options(mode, intervention_penalty, penalty_on, traffic)
+        check_agents(env.unwrapped)
+        EgoShields.__init__(self, env)
+        self.mode = mode
+        self.params = check_params(params, env.unwrapped)
+        self.conduct = check_conduct(entry, intent, waiting, examine)
+        self.rules = rules_of(rules)
+        self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
+        self.intervention_penalty, self.penalty_on = float(intervention_penalty), penalty_on
+        self.record = record
+        self.traffic = traffic
+        self.risk = check_risk(risk)
+        self._begin()
+
+    @property
+    def frames(self) -> tuple[list[Frame], ...]:
+        """Recorded frames of this episode so far, for each agent.
+
+        Raises:
+          ValueError: the wrapper was made without `record=True`.
+        """
+        if not self.record:
+            raise ValueError("record = False: expected True to keep the frames of an episode")
+        return tuple(ego.record or [] for ego in self._guard())
+
+    def audit(self) -> tuple[Audit, ...]:
+        """`ShieldWrapper.audit` for each agent. Needs `record=True`."""
+        _ = self.frames  # were they kept?
+        return tuple(audit_of(ego) for ego in self._egos)
+
+    def reset(self, *, seed=None, options=None):
+        env: Any = self.env.unwrapped
+        check_frequencies(env.config | ((options or {}).get("config") or {}))
+        observation, info = self.env.reset(seed=seed_of(seed), options=options)
+        self._begin()
+        info.update(agents=tuple(info_of(ego) for ego in self._egos), **traffic_info(self))
+        return observation, info
+
+    def step(self, action):
+        action = actions_of(self.action_space, action)
+        egos = self._guard()
+        had_contact = [begin_step(ego) for ego in egos]
+        reward: Any
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        egos = self._guard_after_step(egos)
+        agents = tuple(end_step(*one) for one in zip(egos, had_contact, action, strict=True))
+        info.update(agents=agents, raw_reward=reward, **traffic_info(self))
+        if self.intervention_penalty > 0.0:
+            charges = [charge(agent, self.intervention_penalty, self.penalty_on) for agent in agents]
+            if isinstance(reward, tuple):
+                reward = tuple(r - c for r, c in zip(reward, charges, strict=True))
+            else:
+                reward = reward - np.mean(charges)
+        return observation, reward, terminated, truncated, info
+
+    def _check(self) -> None:
+        check_agents(self.env.unwrapped)
+
+    def _current_settings(self) -> Settings:
+        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
+
+    def _judge_settings(self) -> Settings | None:
+        return settings_for(self.env.unwrapped, *self.judge, "monitor", self.conduct) if self.judge else None
+
+
+def outcome_of_agents(env: Any, actions: tuple) -> tuple[list[float], list[bool]]:
+    """What each agent has earned in the last step, and whether its episode is over.
+
+    Where highway-env says it for its first agent only, its own functions are asked again from the seat of each.
+
+    Args:
+      env: highway-env's environment after a step, before anything else happens to it.
+      actions: of that step.
+    """
+    vehicles, rewards, ends = env.controlled_vehicles, [], []
+    try:
+        for vehicle, action in zip(vehicles, actions, strict=True):
+            env.controlled_vehicles = [vehicle]
+            rewards.append(float(env._reward(action)))
+            ends.append(bool(env._is_terminated()))
+    finally:
+        env.controlled_vehicles = vehicles
+    return rewards, ends
+
+
+def has_agents(env: Any) -> bool:
+    """Does an environment take one action for each of several agents?"""
+    return isinstance(getattr(env, "action_type", None), MultiAgentAction)
+
+
+def check_agents(env: Any) -> None:
+    """Can every agent of an environment be shielded?"""
+    check_kind(env)
+    check_frequencies(env.config)
+    if not has_agents(env):
+        raise ValueError(f"action type {type(env.action_type).__name__} is for one agent; expected MultiAgentAction")
+    kinds, vehicles = env.action_type.agents_action_types, env.controlled_vehicles
+    asked = env.config.get("controlled_vehicles", len(vehicles))
+    if not len(kinds) == len(vehicles) == asked:
+        raise ValueError(f"controlled_vehicles = {asked}: expected {len(kinds)}, as many as {type(env).__name__} has")
+    for action_type in kinds:
+        check_action_type(action_type, env)

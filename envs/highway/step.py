@@ -1,0 +1,159 @@
+"""One controlled vehicle under the shield, from one decision step to the next: what all wrappers have in common."""
+
+from typing import Any
+
+import gymnasium as gym
+from highway_env.vehicle.controller import ControlledVehicle
+
+from rss_shield.envs.highway.compliant import TurnTaker
+from rss_shield.envs.highway.ego import ShieldedEgo, StepTally, log_of
+from rss_shield.envs.highway.free_ego import FreeEgo
+from rss_shield.envs.highway.junction_ego import JunctionEgo
+from rss_shield.envs.options import LANES, Settings
+from rss_shield.shield.comfort import comfort_of
+from rss_shield.shield.lanes.controller import response_name
+from rss_shield.shield.lanes.judge import Audit, audit
+
+LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
+
+
+def attach(
+    vehicle: Any,
+    settings: Settings,
+    record: bool = False,
+    destination: str = "",
+    takes_turns: bool = False,
+    judge: Settings | None = None,
+) -> ShieldedEgo:
+    """Put a shield on a vehicle.
+
+    Args:
+      vehicle: highway-env's.
+      settings, record: see `ShieldedEgo`.
+      destination: where a car goes that is steered freely and has no route; needed where roads cross.
+      takes_turns: it is among compliant drivers.
+      judge: what it is judged by, where that is not what it is restricted by.
+    """
+    if judge is not None:  # first, because the shield that acts is the one that was attached last
+        watching = attach(vehicle, judge._replace(overrides=False), record, destination)
+        ego = attach(vehicle, settings, record, destination, takes_turns)
+        ego.judge = watching
+        return ego
+    if settings.scheme == LANES:
+        return ShieldedEgo(vehicle, settings, record)
+    if not isinstance(vehicle, ControlledVehicle):
+        return FreeEgo(vehicle, settings, record, destination)
+    return (TurnTaker if takes_turns and settings.overrides else JunctionEgo)(vehicle, settings, record)
+
+
+def shield_on(vehicle: Any) -> ShieldedEgo | None:
+    """The shield that a vehicle carries itself; a shallow copy of a vehicle carries that of the original."""
+    shield = getattr(vars(vehicle).get("act"), "__self__", None)
+    return shield if isinstance(shield, ShieldedEgo) and shield.vehicle is vehicle else None
+
+
+def begin_step(ego: ShieldedEgo) -> bool:
+    """Start counting anew; returns whether the ego has had its contact before this step."""
+    ego.tally = StepTally()
+    if ego.meter is not None:
+        ego.meter.begin_step()
+    if ego.judge is not ego:
+        ego.judge.tally = StepTally()
+    return ego.contact is not None
+
+
+def end_step(ego: ShieldedEgo, had_contact: bool, action: Any) -> dict[str, Any]:
+    """Judge what happened since `begin_step`; returns the info of this step."""
+    ego.check_contact()
+    judge = ego.judge
+    at_fault = not had_contact and judge.contact is not None and judge.contact["verdict"] in ("ego", "both")
+    cost = 1.0 if judge.tally.broken_duties or at_fault else 0.0
+    ego.cost += cost
+    info = info_of(ego, cost)
+    info["shield"]["proposed_action"] = action
+    return info
+
+
+def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
+    """What a wrapper says about one ego after a step; see `ShieldWrapper` for the keys."""
+    tally, judge = ego.tally, ego.judge
+    frames, all_frames = max(tally.frames, 1), max(ego.frames, 1)
+    return {
+        "shield": {
+            "intervened": tally.overridden > 0,
+            "override_fraction": tally.overridden / frames,
+            "anticipation_fraction": tally.anticipated / frames,
+            "limited_fraction": tally.limited / frames,
+            "acceleration_change": tally.acceleration_change,
+            "steering_change": tally.steering_change,
+            "mean_acceleration_change": tally.acceleration_changed / frames,
+            "mean_steering_change": tally.steering_changed / frames,
+            "lane_change_refused": tally.lane_change_refused,
+            "dangerous": judge.tally.dangerous_pairs > 0,
+            "dangerous_pairs": judge.tally.dangerous_pairs,
+            "broken_duties": judge.tally.broken_duties,
+            "min_margin_lon": tally.margin_lon,
+            "min_margin_lat": tally.margin_lat,
+            "partner": tally.partner,
+            "response": response_name(tally.response),
+        },
+        "cost": cost,
+        "blame": judge.contact["verdict"] if judge.contact else "",
+        "blame_evidence": dict(judge.contact) if judge.contact else {},
+        "override_share": ego.frames_overridden / all_frames,
+        "anticipation_share": ego.frames_anticipated / all_frames,
+        "limited_share": ego.frames_limited / all_frames,
+        "mean_acceleration_change": ego.acceleration_changed / all_frames,
+        "mean_steering_change": ego.steering_changed / all_frames,
+        "episode_cost": ego.cost,
+        "episode_dangerous_pairs": judge.dangerous_pairs,
+        "episode_broken_duties": judge.broken_duties,
+        "min_ttc": min(ego.min_ttc, LONGEST_TTC),
+        **comfort_of(ego.ride)._asdict(),
+        **(ego.meter.info() if ego.meter is not None else {}),
+    }
+
+
+class Told(gym.Wrapper):
+    """Below a wrapper that reads infos itself: puts into them what a shield around that wrapper says."""
+
+    def __init__(self, env: gym.Env, shield: Any) -> None:
+        super().__init__(env)
+        self.shield = shield
+
+    def step(self, action):
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self.shield.tell(info, reward)
+        return observation, reward, terminated, truncated, info
+
+
+def tell_inside(shield: Any) -> None:
+    """Let a wrapper inside a shield's that reads infos, as stable-baselines3's `Monitor` does, read the shield's."""
+    env, reader = shield.env, None
+    while isinstance(env, gym.Wrapper):
+        if getattr(env, "info_keywords", ()):
+            reader = env
+        env = env.env
+    if reader is not None:
+        reader.env = Told(reader.env, shield)
+
+
+def charge(info: dict[str, Any], penalty: float, penalty_on: str) -> Any:
+    """What an ego pays for the interventions of a step: the penalty times the share of frames or the mean change."""
+    shield = info["shield"]
+    return penalty * (shield["override_fraction"] if penalty_on == "response" else shield["mean_acceleration_change"])
+
+
+def audit_of(ego: ShieldedEgo) -> Audit:
+    """For every recorded dangerous pair-frame of one ego: did it keep its duty?
+
+    Raises:
+      ValueError: roads cross; recorded frames hold distances along a lane, and the duties there are others.
+    """
+    settings, frames = ego.judge.settings, ego.judge.record or []
+    if settings.scheme != LANES:
+        raise ValueError(
+            "audit: expected an environment without junctions; where roads cross, infos count the pair-frames: "
+            "episode_dangerous_pairs, episode_broken_duties"
+        )
+    return audit(log_of(frames), settings.ego, settings.other, settings.rules, settings.dt)

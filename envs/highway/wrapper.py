@@ -1,0 +1,236 @@
+"""ShieldWrapper: the RSS shield around a highway-env environment."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium as gym
+from gymnasium.utils import RecordConstructorArgs
+from highway_env.envs.intersection_env import IntersectionEnv
+
+from rss_shield.envs.arguments import action_of, plain, rules_of, seed_of
+from rss_shield.envs.highway.ego import Frame, ShieldedEgo
+from rss_shield.envs.highway.egos import EgoShields
+from rss_shield.envs.highway.risk import RiskFrame, check_risk
+from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of, tell_inside
+from rss_shield.envs.options import (
+    Params,
+    Settings,
+    check_conduct,
+    check_environment,
+    check_options,
+    check_params,
+    judge_of,
+    settings_for,
+)
+from rss_shield.envs.stock import check_frequencies
+from rss_shield.shield.lanes.judge import Audit
+from rss_shield.shield.params import Rules
+from rss_shield.shield.risk import RiskSettings
+
+
+class ShieldWrapper(EgoShields, RecordConstructorArgs):
+    """Watches the ego on every simulation frame and says who is to blame at a contact.
+
+    In mode "override" a command that RSS does not permit is replaced by the proper response; in
+    mode "monitor" nothing is changed and the trajectory is the bare environment's, bit for bit.
+    Observations are never changed; rewards only by `intervention_penalty`.
+    The shield is on whichever vehicle is the ego at a step; it is copied with its vehicle.
+
+    Every info has
+
+      shield: dict of this step: `intervened`, `override_fraction` (share of the frames in which a
+        duty toward somebody changed the command: the proper response), `anticipation_fraction` (in which no duty did,
+        but anticipation), `limited_fraction` (in which only the always-on limits did), `proposed_action` (after a
+        step), `acceleration_change` [m/s^2] and `steering_change` [rad] (largest), `mean_acceleration_change` and
+        `mean_steering_change` (over the frames), `lane_change_refused`, `dangerous`, `dangerous_pairs`, `broken_duties`
+        (pair-frames), and for the pair nearest to danger `partner` (index in `road.vehicles`,
+        static objects after them, -1 = nobody; where roads cross, who was in the way when the ego was first
+        held back in this step), `min_margin_lon`, `min_margin_lat` (gap minus required gap [m], inf = nobody);
+        `response`: "none", "longitudinal", "lateral", "both", or "go": on
+        through a junction.
+      cost: 1.0 if the ego broke its proper response in this step or a contact was its fault.
+      blame: "" before a contact, then "ego", "other", "both", "inherited", or "none" (a bug).
+      blame_evidence: {} or partner, kind of danger, seconds since its threshold, duties broken and
+        by how much.
+      override_share, anticipation_share, limited_share, mean_acceleration_change [m/s^2], mean_steering_change [rad]:
+        the same since reset.
+      rms_acceleration, rms_jerk, ..., hard_brakings_per_km, min_time_gap: how the ride felt since reset, see
+        `shield.comfort.Comfort`. Time gaps are measured where distances along lanes keep the ego safe.
+      episode_cost, episode_dangerous_pairs, episode_broken_duties, min_ttc: since
+        reset; min_ttc [s] is at most 100.
+      raw_reward: the environment's own reward (after a step).
+      time: since reset [s].
+      is_success: has the ego reached its goal? Only where there is one: past an intersection, on the exit
+        (after a step).
+      risk: only with the option `risk`: of the worst frame of this step `rdsi`, its thresholds `lower` and `upper`,
+        `state` ("known_safe", "unknown", "known_unsafe") and `partner`; the `largest` of one source and the largest
+        `total` of all and of lane markings, with `state_of_total`; and toward the leader the smallest `ttc`, `thw` [s]
+        and the largest `drac` [m/s^2]. Since reset: max_rdsi (of one source), max_total_rdsi, time_known_safe,
+        time_unknown, time_known_unsafe [s], band_risk (integral of RDSI over the stays in the unknown [s]), min_thw
+        (at most 100), max_drac. See `shield.risk`.
+      traffic_blame: with compliant traffic, the verdicts of all other cars that have had a contact, each from its
+        own view.
+
+    Args:
+      env: a highway-env environment with one controlled vehicle; see `SUPPORTED`.
+      mode: "override" or "monitor".
+      params: name of a preset, `Preset`, a pair of `RSSParams` (ego, other), a dict of RSS parameters that both have,
+        a dict of two such dicts ("ego", "other"), or None: "intersection" at intersections, "simulator" elsewhere.
+        What a dict leaves out is that of None.
+      intervention_penalty: subtracted from the reward, times what `penalty_on` names.
+      penalty_on: "response", the step's `override_fraction` (the penalty is per decision that is overridden on all
+        frames), or "change", its `mean_acceleration_change` (the penalty is per m/s^2).
+      rules: which duties and margins are in force, for ablations: `Rules`, or a dict of those that differ.
+      record: keep every frame of the episode in `frames`, for `audit`.
+      entry: whom the ego expects to give way at a junction: "cautious" nobody, "priority" who must
+        and still can, "assertive" everybody who still can (Def. 17 as printed).
+      intent: which routes it expects of others: "known" (V2X), "straight", or "any" that fits.
+      waiting: where it may wait: at the "line", in nobody's way whoever may come, or "anywhere" in
+        the junction that is in the way of nobody who is there.
+      examine: against whom it checks its plans through a junction: "table" whose ways meet its own, "all"
+        everybody, for the same commands; "geofence", "walk", "first-conflicting" and "first" may miss
+        somebody (`shield.junctions.examined`).
+      traffic: "stock", or "compliant": every other car has a shield of its own, in every mode.
+      risk: measure the driving safety field around the ego, too: True, or `RiskSettings`.
+      judge_params, judge_rules: what the ego is judged by, with a memory of its own: blame, duties, cost and dangerous
+        pairs. None = what it is restricted by. A sweep over response times needs one judge for all.
+
+    Raises:
+      ValueError: unsupported environment, action type or mode; bad parameters; a response time
+        below one simulation frame; more decisions than frames; a shield around a shield; at a step, an ego that is
+        not on the environment's road.
+    """
+
+    def __init__(
+        self,
+        env: gym.Env,
+        mode: str = "override",
+        params: Params = None,
+        intervention_penalty: float = 0.0,
+        penalty_on: str = "response",
+        rules: Rules | Mapping[str, Any] = Rules(),
+        record: bool = False,
+        entry: str = "cautious",
+        intent: str = "any",
+        waiting: str = "line",
+        traffic: str = "stock",
+        examine: str = "table",
+        risk: bool | RiskSettings = False,
+        judge_params: Params = None,
+        judge_rules: Rules | Mapping[str, Any] | None = None,
+    ) -> None:
+        RecordConstructorArgs.__init__(
+            self,
+            mode=mode,
+            params=plain(params),
+            intervention_penalty=plain(intervention_penalty),
+            penalty_on=penalty_on,
+            rules=plain(rules),
+            record=record,
+            entry=entry,
+            intent=intent,
+            waiting=waiting,
+            traffic=traffic,
+            examine=examine,
+            risk=risk,
+            judge_params=plain(judge_params),
+            judge_rules=plain(judge_rules),
+        )
+        check_options(mode, intervention_penalty, penalty_on, traffic)
+        check_environment(env.unwrapped)
+        EgoShields.__init__(self, env)
+        self.mode = mode
+        self.params = check_params(params, env.unwrapped)
+        self.conduct = check_conduct(entry, intent, waiting, examine)
+        self.rules = rules_of(rules)
+        self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
+        self.intervention_penalty, self.penalty_on = float(intervention_penalty), penalty_on
+        self.record = record
+        self.traffic = traffic
+        self.risk = check_risk(risk)
+        self._told = True
+        tell_inside(self)
+        self._begin()
+
+    @property
+    def frames(self) -> list[Frame]:
+        """Recorded frames of this episode so far, since the ego became the ego.
+
+        Raises:
+          ValueError: the wrapper was made without `record=True`.
+        """
+        if self._ego.record is None:
+            raise ValueError("record = False: expected True to keep the frames of an episode")
+        return self._ego.record
+
+    @property
+    def risk_frames(self) -> list[RiskFrame]:
+        """Risk of every frame of this episode so far.
+
+        Raises:
+          ValueError: the wrapper was made without `risk`.
+        """
+        if self._ego.meter is None:
+            raise ValueError("risk = False: expected True to measure the risk of an episode")
+        return self._ego.meter.frames
+
+    def audit(self) -> Audit:
+        """For every dangerous pair-frame of this episode so far: did the ego keep its duty? Needs `record=True`.
+
+        Raises:
+          ValueError: nothing was recorded, or roads cross: infos count the duties there.
+        """
+        _ = self.frames  # were they kept?
+        return audit_of(self._ego)
+
+    def reset(self, *, seed=None, options=None):
+        env: Any = self.env.unwrapped
+        check_frequencies(env.config | ((options or {}).get("config") or {}))
+        observation, info = self.env.reset(seed=seed_of(seed), options=options)
+        self._begin()
+        env = self.env.unwrapped
+        info.update(info_of(self._egos[0]), time=float(env.time), **traffic_info(self))
+        return observation, info
+
+    def step(self, action):
+        executed = action_of(self.action_space, action)
+        self._stepping = self._guard()
+        self._action, self._had_contact, self._told = action, begin_step(self._stepping[0]), False
+        observation, reward, terminated, truncated, info = self.env.step(executed)
+        self.tell(info, reward)
+        reward = reward - charge(info, self.intervention_penalty, self.penalty_on)
+        return observation, reward, terminated, truncated, info
+
+    def tell(self, info: dict, reward: Any) -> None:
+        """Write into the info of this step what the shield says, once."""
+        if self._told:
+            return
+        self._told = True
+        (ego,) = self._guard_after_step(self._stepping)
+        info.update(end_step(ego, self._had_contact, self._action), **traffic_info(self))
+        env: Any = self.env.unwrapped
+        info.update(time=float(env.time), raw_reward=reward)
+        if isinstance(env, IntersectionEnv):
+            info["is_success"] = bool(env.has_arrived(env.vehicle))
+
+    @property
+    def _ego(self) -> ShieldedEgo:
+        """The shield on the ego, whichever vehicle that is now."""
+        return self._guard()[0]
+
+    def _check(self) -> None:
+        check_environment(self.env.unwrapped)
+
+    def _current_settings(self) -> Settings:
+        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
+
+    def _judge_settings(self) -> Settings | None:
+        return settings_for(self.env.unwrapped, *self.judge, "monitor", self.conduct) if self.judge else None
+
+
+def traffic_info(wrapper) -> dict[str, Any]:
+    """What infos say about compliant traffic."""
+    if wrapper.traffic == "stock":
+        return {}
+    contacts = [driver.contact for driver in wrapper.drivers if driver.check_contact()]
+    return {"traffic_blame": tuple(contact["verdict"] for contact in contacts)}

@@ -1,0 +1,138 @@
+"""Many environments at once, on either simulator."""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.wrappers import RecordEpisodeStatistics
+from highway_env.envs.common.action import DiscreteMetaAction
+
+from rss_shield.envs.arguments import rules_of, seed_of, whole
+from rss_shield.envs.fast.config import Unsupported, compile_scenario
+from rss_shield.envs.fast.vector import FastVectorEnv
+from rss_shield.envs.make import make
+from rss_shield.envs.options import (
+    MODES,
+    PLANS,
+    Params,
+    check_conduct,
+    check_environment,
+    check_options,
+    check_params,
+    settings_for,
+)
+from rss_shield.shield.params import Rules
+
+BACKENDS = ("fast", "highway-env")
+
+
+def make_vec(
+    env_id: str,
+    num_envs: int,
+    shield: str | None = "override",
+    backend: str = "fast",
+    params: Params = None,
+    rules: Rules | Mapping[str, Any] = Rules(),
+    intervention_penalty: float = 0.0,
+    penalty_on: str = "response",
+    config: dict | None = None,
+    threads: int = 1,
+    autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
+    entry: str = "cautious",
+    intent: str = "any",
+    waiting: str = "line",
+    examine: str = "table",
+    traffic: str = "stock",
+    **kwargs: Any,
+) -> VectorEnv:
+    """Environments side by side, each with a shield around its ego.
+
+    Both backends have the same spaces, seeds, episodes and infos. gymnasium's vector wrappers that ask for it
+    (`NormalizeObservation`, `FlattenObservation`) take `autoreset_mode=AutoresetMode.NEXT_STEP` on either.
+
+    Args:
+      env_id: "highway-fast-v0", "highway-v0", ...
+      num_envs: how many.
+      shield: "override", "monitor", or None for bare environments.
+      backend: "fast", the compiled engine, or "highway-env", the original one after the other.
+      params, rules, intervention_penalty, penalty_on, entry, intent, waiting, examine, traffic: see `ShieldWrapper`.
+      config: as for `gymnasium.make` of a highway-env environment.
+      threads: of the compiled engine.
+      autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
+      kwargs: `max_episode_steps`, and whatever else `make` takes (`judge_params`, ...) where the backend is
+        "highway-env".
+
+    Raises:
+      ValueError: unknown names, or something that the engine does not support; the message names it.
+    """
+    num_envs, threads = whole("num_envs", num_envs, 1), whole("threads", threads, 1)
+    autoreset_mode = _autoreset(autoreset_mode)
+    for name, instead in _OF_GYMNASIUM.items():
+        if name in kwargs:
+            raise ValueError(f"{name} = {kwargs[name]!r}: make_vec does not support it; expected {instead}")
+    if backend not in BACKENDS:
+        raise ValueError(f"backend = {backend!r}: expected one of {', '.join(BACKENDS)}")
+    if shield is not None and shield not in MODES:
+        raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
+    check_options(shield or MODES[0], intervention_penalty, penalty_on, traffic)
+    if backend == "highway-env":
+        options: dict[str, Any] = dict(
+            params=params,
+            rules=rules,
+            intervention_penalty=intervention_penalty,
+            penalty_on=penalty_on,
+            config=config,
+            traffic=traffic,
+        )
+        options |= dict(entry=entry, intent=intent, waiting=waiting, examine=examine) | kwargs
+        return _SideBySide([partial(_make_counted, env_id, shield, options)] * num_envs, autoreset_mode=autoreset_mode)
+    unsupported = {"traffic": traffic} if traffic != "stock" else {}
+    unsupported |= {
+        name: value
+        for name, value in kwargs.items()
+        if value is not None and value is not False and name != "max_episode_steps"
+    }
+    for name, value in unsupported.items():
+        raise Unsupported(f"{name} = {value!r}", "backend = 'highway-env'")
+    scenario = compile_scenario(env_id, config, max_episode_steps=kwargs.get("max_episode_steps"))
+    settings = None
+    if shield is not None:
+        stock = scenario.stock
+        check_environment(stock)
+        conduct = check_conduct(entry, intent, waiting, examine)
+        settings = settings_for(stock, check_params(params, stock), rules_of(rules), shield, conduct)
+        if settings.scheme == PLANS and not isinstance(stock.action_type, DiscreteMetaAction):
+            kind = type(stock.action_type).__name__
+            raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
+    by_change, penalty = penalty_on == "change", float(intervention_penalty)
+    return FastVectorEnv(scenario, num_envs, settings, penalty, autoreset_mode, threads, by_change)
+
+
+_OF_GYMNASIUM = {  # arguments of its `make_vec` that mean something else here
+    "vectorization_mode": "backend = 'fast' or 'highway-env'",
+    "vector_kwargs": "autoreset_mode and threads",
+    "wrappers": "wrappers around what make_vec returns",
+}
+
+
+class _SideBySide(SyncVectorEnv):
+    """gymnasium's, for seeds of numpy as well."""
+
+    def reset(self, *, seed: Any = None, options: dict | None = None):
+        several = seed is not None and np.ndim(seed) > 0
+        return super().reset(seed=[seed_of(one) for one in seed] if several else seed_of(seed), options=options)
+
+
+def _autoreset(mode: Any) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        names = ", ".join(f"AutoresetMode.{known.name}" for known in AutoresetMode)
+        raise ValueError(f"autoreset_mode = {mode!r}: expected one of {names}") from None
+
+
+def _make_counted(env_id: str, shield: str | None, options: dict) -> gym.Env:
+    return RecordEpisodeStatistics(make(env_id, shield, **options))

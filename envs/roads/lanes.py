@@ -1,0 +1,282 @@
+"""highway-env's road networks as roads that the shield measures along.
+
+The road of a car is what leads to its lane and what it may drive next: its planned route as far as there is
+one, and every branch beyond that. Arc length counts from the start of its lane.
+"""
+
+from collections.abc import Iterable
+from heapq import heappop, heappush
+from typing import Any, NamedTuple
+
+import numpy as np
+from highway_env.road.lane import CircularLane, SineLane, StraightLane
+from highway_env.vehicle.controller import ControlledVehicle
+from highway_env.vehicle.kinematics import Vehicle
+
+from rss_shield.shield.definitions.longitudinal import d_min_longitudinal, euler_margin
+from rss_shield.shield.geometry import (
+    AFTER,
+    AROUND,
+    BEFORE,
+    CURVATURE,
+    CUT,
+    FREE,
+    HEADING,
+    LENGTH,
+    make_road,
+    wrap_angle,
+)
+from rss_shield.shield.params import RSSParams
+
+LaneIndex = tuple[str, str, int]
+Way = tuple[tuple[str, str], ...]  # roads one after the other: node where each starts, node where it ends
+
+_JOIN = 0.5  # lane ends closer than this belong together [m]
+_TURN = np.pi / 4  # ... if the angle between them is smaller than this [rad]
+_SAMPLE = 2.0  # spacing of the pieces that stand in for a curve of changing curvature [m]
+_ALIGNED = 1e-9  # straight pieces with headings as close as this are one line [rad]
+_LONGEST = 20.0  # of two road users, added up [m]
+
+
+class _Stretch(NamedTuple):
+    """A lane on the road through another one, the origin."""
+
+    lane: LaneIndex
+    shift: float  # of the road from the middle of the lane, positive to the right [m]
+    nearer: LaneIndex | None  # lane between it and the origin
+    start: float  # arc length of its start, from the start of the origin [m]
+    pieces: list[tuple[float, ...]]
+    links: list[tuple[LaneIndex, float, Way]]  # what comes next: lane, shift, and the way after it
+
+
+# ---------------------------------------------------------------- roads
+
+
+def road_through(
+    network: Any, index: LaneIndex, reach: float = np.inf, way: Way = (), beside: Iterable[LaneIndex] = ()
+) -> np.ndarray:
+    """The road through a lane as `[K, 11]` pieces.
+
+    Args:
+      network: a `highway_env.road.road.RoadNetwork`.
+      index: of the lane.
+      reach: how far the road is followed beyond either end of the lane [m].
+      way: roads that are driven after it; every branch counts after those.
+      beside: lanes that start where it starts and may still be driven instead.
+    """
+    behind, _ = _explore(network, index, reach, False, ())
+    ahead, around = _explore(network, index, reach, True, way)
+    order = {lane: stretch for lane, stretch in reversed(behind.items()) if lane not in ahead} | ahead
+    for other in beside:
+        order = order | _explore(network, other, reach, True, ())[0] | order  # in this order, as they are known so far
+    road = make_road([row for stretch in order.values() for row in _rows(stretch)])
+    ends = np.cumsum([len(stretch.pieces) for stretch in order.values()])
+    last = dict(zip(order, ends - 1, strict=True))
+    first = {lane: last[lane] + 1 - len(stretch.pieces) for lane, stretch in order.items()}
+    for lane, stretch in order.items():
+        road[first[lane], BEFORE] = FREE if stretch.nearer is None else last[stretch.nearer]
+        road[last[lane], AFTER] = _next(stretch, first)
+    for lane, stretch in behind.items():
+        if stretch.nearer is not None:
+            road[last[lane], AFTER] = first[stretch.nearer]
+        if lane not in ahead or lane == index:
+            road[first[lane], BEFORE] = _next(stretch, last)
+        elif lane in ahead:
+            road[first[lane] : last[lane] + 1, AROUND] = ahead[lane].start - stretch.start
+    for lane in beside:
+        road[first[lane], BEFORE] = road[first[index], BEFORE]
+    road[first[index] : last[index] + 1, AROUND] = around
+    return road
+
+
+def _rows(stretch: _Stretch) -> list[tuple[float, ...]]:
+    starts = stretch.start + np.cumsum([0.0, *(piece[LENGTH] for piece in stretch.pieces)])
+    return [(*piece, start) for piece, start in zip(stretch.pieces, starts, strict=False)]
+
+
+def _next(stretch: _Stretch, row: dict[LaneIndex, int]) -> int:
+    """Row of what comes next after a stretch."""
+    if not stretch.links:
+        return FREE
+    return next((row[lane] for lane, *_ in stretch.links if lane in row), CUT)
+
+
+def _explore(
+    network: Any, index: LaneIndex, reach: float, forward: bool, way: Way
+) -> tuple[dict[LaneIndex, _Stretch], float]:
+    """Lanes that come after (or before) a lane, nearest first, each by the shortest way; and the shortest way round."""
+    found: dict[LaneIndex, _Stretch] = {}
+    waiting: list[tuple[float, int, Any]] = [(0.0, 0, (index, 0.0, None, way))]
+    count, around, middle = 0, np.inf, 0.0
+    while waiting:
+        distance, _, (lane, shift, nearer, rest) = heappop(waiting)
+        if lane in found:
+            if lane == index:
+                around = min(around, distance)
+            continue
+        pieces = _pieces_of(network.get_lane(lane), shift)
+        length = sum(piece[LENGTH] for piece in pieces)
+        middle = middle or length  # the length of the lane that all started from
+        links = _links(network, lane, shift, forward, rest)
+        start = distance if forward else middle - distance - length
+        found[lane] = _Stretch(lane, shift, nearer, start, pieces, links)
+        if distance + length - middle < reach:
+            for following, moved, later in links:
+                count += 1
+                heappush(waiting, (distance + length, count, (following, moved, lane, later)))
+    return _without_ends(found), around
+
+
+def _without_ends(found: dict[LaneIndex, _Stretch]) -> dict[LaneIndex, _Stretch]:
+    """Leave out where a lane ends and its neighbour goes on straight ahead: so does the road at any free end."""
+    for lane, stretch in reversed(list(found.items())):
+        if stretch.shift != 0.0 and not stretch.links and stretch.nearer is not None:
+            bordering = found[stretch.nearer]
+            pieces = bordering.pieces + stretch.pieces
+            headings = [abs(wrap_angle(piece[HEADING] - pieces[0][HEADING])) for piece in pieces]
+            bent = any(piece[CURVATURE] for piece in pieces)
+            if not bent and max(headings) < _ALIGNED and len(bordering.links) == 1:
+                found = {other: found[other] for other in found if other != lane}
+                found[stretch.nearer] = bordering._replace(links=[])
+    return found
+
+
+def _links(network: Any, index: LaneIndex, shift: float, forward: bool, way: Way) -> list[tuple[LaneIndex, float, Way]]:
+    """Lanes that continue a lane (or lead to it), with the shift of the road on them and the way after them.
+
+    Those that continue it without a jump, on the planned road if there are any; or else the nearest: the lane
+    ends, and the road goes on beside it.
+    """
+    lane = network.get_lane(index)
+    s = lane.length if forward else 0.0
+    end, heading = lane.position(s, shift), lane.heading_at(s)
+    joined, aside = [], []
+    for road in _roads_at(network, index, forward):
+        planned = bool(way) and way[0] == road
+        for i, other in enumerate(network.graph[road[0]][road[1]]):
+            at = 0.0 if forward else other.length
+            if abs(wrap_angle(heading - other.heading_at(at))) >= _TURN:
+                continue
+            gap, normal = end - other.position(at, 0.0), other.position(at, 1.0) - other.position(at, 0.0)
+            across, link, rest = float(gap @ normal), (*road, i), way[1:] if planned else ()
+            if np.hypot(*gap) < _JOIN:
+                joined.append((planned, (link, 0.0, rest)))
+            elif np.hypot(*(gap - across * normal)) < _JOIN:
+                aside.append((not planned, abs(across), (link, across, rest)))
+    if joined or not aside:
+        chosen = any(planned for planned, _ in joined)
+        return [link for planned, link in joined if planned or not chosen]
+    return [min(aside, key=lambda one: one[:2])[2]]
+
+
+def _roads_at(network: Any, index: LaneIndex, forward: bool) -> list[tuple[str, str]]:
+    """Roads that start where a lane ends, or that end where it starts."""
+    if forward:
+        return [(index[1], end) for end in network.graph.get(index[1], {})]
+    return [(origin, index[0]) for origin, ends in network.graph.items() if index[0] in ends]
+
+
+def _pieces_of(lane: Any, shift: float = 0.0) -> list[tuple[float, ...]]:
+    """Pieces of constant curvature of one lane, or beside it: start x, y, heading, curvature, length."""
+    if isinstance(lane, StraightLane) and not isinstance(lane, SineLane):
+        (x, y), heading = lane.position(0.0, shift), lane.heading_at(0.0)
+        return [(x, y, heading, 0.0, lane.length)]
+    if isinstance(lane, CircularLane):
+        (x, y), heading = lane.position(0.0, shift), lane.heading_at(0.0)
+        curvature = (1.0 if lane.clockwise else -1.0) / lane.radius
+        scale = max(1.0 - curvature * shift, 1e-3)
+        return [(x, y, heading, curvature / scale, lane.length * scale)]
+    corners = np.array(
+        [lane.position(s, shift) for s in np.linspace(0.0, lane.length, int(lane.length // _SAMPLE) + 2)]
+    )
+    steps = np.diff(corners, axis=0)
+    return [
+        (x, y, np.arctan2(dy, dx), 0.0, np.hypot(dx, dy)) for (x, y), (dx, dy) in zip(corners[:-1], steps, strict=True)
+    ]
+
+
+def tightest(network: Any) -> float:
+    """Largest curvature of any arc of a network [1/m]."""
+    return max((1.0 / lane.radius for lane in network.lanes_list() if isinstance(lane, CircularLane)), default=0.0)
+
+
+def reach_of(ego: RSSParams, other: RSSParams, dt: float) -> float:
+    """Farthest that anybody can matter along a road: both come toward each other as fast as highway-env allows [m]."""
+    v = Vehicle.MAX_SPEED
+    margins = euler_margin(v, ego.a_min_brake, dt) + euler_margin(v, other.a_min_brake, dt) + _LONGEST
+    head_on = d_min_longitudinal(v, -v, True, ego, other, ego.a_min_brake_correct, other.a_min_brake_correct)
+    return float(head_on + margins)
+
+
+# ---------------------------------------------------------------- which road a car drives
+
+
+class Heading(NamedTuple):
+    """Where a car is and which way it takes from there."""
+
+    lane: LaneIndex
+    way: Way = ()  # planned roads after it
+    beside: tuple[LaneIndex, ...] = ()  # lanes that it may still take instead
+
+
+def heading_of(vehicle: Any) -> Heading:
+    """The lane that a car drives on and its planned way.
+
+    Where lanes lie on top of each other, as where roads fork or merge, the nearest one says little: a car that
+    heads for one of them is on that. A car that is steered freely is on each of those that it has not left yet.
+    """
+    network, index = vehicle.road.network, vehicle.lane_index
+    if not isinstance(vehicle, ControlledVehicle):
+        return Heading(index, (), tuple(lane for lane in _forks(network, index) if _overlaps(vehicle, lane)))
+    target = vehicle.target_lane_index
+    if target[:2] != index[:2]:
+        twins = [lane for lane in _forks(network, index) + _merges(network, index) if lane[:2] == target[:2]]
+        index = twins[0] if twins else index
+    return Heading(index, _way_after(index, [target, *(vehicle.route or [])]))
+
+
+def _way_after(index: LaneIndex, route: list[LaneIndex]) -> Way:
+    """The roads of a route after a lane, as far as they follow one another."""
+    roads = [(road[0], road[1]) for road in route]
+    way: list[tuple[str, str]] = []
+    for road in roads[roads.index(index[:2]) + 1 :] if index[:2] in roads else roads:
+        at = way[-1] if way else index
+        if road[0] == at[1]:
+            way.append(road)
+        elif road != at[:2]:
+            break
+    return tuple(way)
+
+
+def _forks(network: Any, index: LaneIndex) -> list[LaneIndex]:
+    """Other lanes that start where a lane starts."""
+    lane = network.get_lane(index)
+    return [
+        (index[0], end, i)
+        for end, lanes in network.graph[index[0]].items()
+        for i, other in enumerate(lanes)
+        if other is not lane and _meet(lane, 0.0, other, 0.0)
+    ]
+
+
+def _merges(network: Any, index: LaneIndex) -> list[LaneIndex]:
+    """Other lanes that end where a lane ends."""
+    lane = network.get_lane(index)
+    return [
+        (origin, index[1], i)
+        for origin, ends in network.graph.items()
+        for i, other in enumerate(ends.get(index[1], []))
+        if other is not lane and _meet(lane, lane.length, other, other.length)
+    ]
+
+
+def _meet(lane: Any, s: float, other: Any, at: float) -> bool:
+    turn = wrap_angle(lane.heading_at(s) - other.heading_at(at))
+    return bool(np.hypot(*(lane.position(s, 0.0) - other.position(at, 0.0))) < _JOIN and abs(turn) < _TURN)
+
+
+def _overlaps(vehicle: Any, index: LaneIndex) -> bool:
+    """Is any part of a car on a lane?"""
+    lane = vehicle.road.network.get_lane(index)
+    s, lateral = lane.local_coordinates(vehicle.position)
+    return abs(lateral) < (lane.width_at(s) + vehicle.WIDTH) / 2

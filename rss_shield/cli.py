@@ -1,0 +1,26 @@
+"""The console command `rss-shield`."""
+
+import importlib
+import sys
+
+COMMANDS = {"train": ("rss_shield.train", "train", "train with and without the shield, test, compare")}
+_USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Run one command; what it needs to be installed is looked for only then."""
+    arguments = sys.argv[1:] if argv is None else argv
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(_USAGE + "\n".join(f"  {name:10s} {text}" for name, (_, _, text) in COMMANDS.items()))
+        return
+    name, *rest = arguments
+    if name not in COMMANDS:
+        sys.exit(f"rss-shield: unknown command {name!r}; expected one of {', '.join(COMMANDS)}")
+    module, extra, _ = COMMANDS[name]
+    try:
+        command = importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("rss_shield"):
+            raise
+        sys.exit(f"rss-shield {name} needs the package {error.name!r}: pip install 'rss-shield[{extra}]'")
+    command.run(rest)

@@ -1,0 +1,1 @@
+"""How functions are compiled: private, checked when it is imported."""

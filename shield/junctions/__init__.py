@@ -1,0 +1,1 @@
+"""Road users kept safe by plans, where roads cross."""

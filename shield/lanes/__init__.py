@@ -1,0 +1,1 @@
+"""Road users kept safe by distances along and across lanes."""

@@ -1,0 +1,184 @@
+"""The environment's configuration from files and command lines, checked against what the environment knows."""
+
+import json
+
+import pytest
+
+from rss_shield.envs.configuration import check_config, default_config
+from rss_shield.eval.config_option import read_config, split_arguments, with_values
+
+
+def test_a_configuration_is_read_from_json_toml_and_text(tmp_path):
+    expected = {"lanes_count": 4, "observation": {"type": "Kinematics", "clip": False}}
+    (tmp_path / "road.json").write_text(json.dumps(expected))
+    (tmp_path / "road.toml").write_text('lanes_count = 4\n[observation]\ntype = "Kinematics"\nclip = false\n')
+    assert read_config(str(tmp_path / "road.json")) == expected
+    assert read_config(str(tmp_path / "road.toml")) == expected
+    assert read_config(json.dumps(expected)) == expected
+
+
+@pytest.mark.parametrize("name", ["road.yaml", "road.YML"])
+def test_a_configuration_in_yaml(name, tmp_path):
+    (tmp_path / name).write_text("lanes_count: 4\nobservation: {type: Kinematics}\n")
+    assert read_config(str(tmp_path / name)) == {"lanes_count": 4, "observation": {"type": "Kinematics"}}
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.json", "[1, 2]", "expected keys with values, found \\[1, 2\\]"),
+        ("a.json", "{", "cannot be read: Expecting property name"),
+        ("a.toml", "lanes_count: 4", "cannot be read: "),
+        ("a.yaml", "{lanes_count: 4", "cannot be read: "),
+        ("a.ini", "", "expected a file .json, .toml, .yaml or .yml, or JSON itself"),
+    ],
+)
+def test_a_file_that_cannot_be_read_says_why(name, content, message, tmp_path):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(ValueError, match=message):
+        read_config(str(tmp_path / name))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keys", "value"),
+    [
+        ("--config.lanes-count 4", ("lanes_count",), 4),
+        ("--config.lanes_count=4", ("lanes_count",), 4),
+        ("--config.duration 1e1", ("duration",), 10.0),
+        ("--config.collision-reward -1.5", ("collision_reward",), -1.5),
+        ("--config.normalize-reward false", ("normalize_reward",), False),
+        ("--config.offroad-terminal True", ("offroad_terminal",), True),
+        ("--config.initial-lane-id null", ("initial_lane_id",), None),
+        ("--config.initial-lane-id None", ("initial_lane_id",), None),
+        ("--config.destination o1", ("destination",), "o1"),
+        ("--config.reward-speed-range 20 30", ("reward_speed_range",), [20, 30]),
+        ("--config.action.target-speeds [0,4.5,9]", ("action", "target_speeds"), [0, 4.5, 9]),
+        ("--config.observation.features presence x y", ("observation", "features"), ["presence", "x", "y"]),
+        ("--config.lanes-count 3 --config.lanes-count 5", ("lanes_count",), 5),
+    ],
+)
+def test_single_values_are_taken_out_of_a_command_line(arguments, keys, value):
+    others, values = split_arguments(["--seeds", "1", "2", *arguments.split(), "--resume"])
+    assert others == ["--seeds", "1", "2", "--resume"]
+    assert values == {keys: value}
+    assert type(values[keys]) is type(value)
+
+
+def test_single_values_win_and_nested_ones_keep_what_is_beside_them():
+    defaults = {"observation": {"type": "Kinematics", "absolute": True}, "action": {"type": "DiscreteMetaAction"}}
+    file = {"lanes_count": 2, "vehicles_count": 10, "action": {"type": "DiscreteMetaAction", "lateral": False}}
+    values = {
+        ("lanes_count",): 4,
+        ("observation", "vehicles_count"): 8,
+        ("action", "target_speeds"): (10, 20),
+    }
+    assert with_values(file, values, defaults) == {
+        "lanes_count": 4,
+        "vehicles_count": 10,
+        "observation": {"type": "Kinematics", "absolute": True, "vehicles_count": 8},
+        "action": {"type": "DiscreteMetaAction", "lateral": False, "target_speeds": [10, 20]},
+    }
+    assert file["lanes_count"] == 2
+    assert defaults["observation"] == {"type": "Kinematics", "absolute": True}
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_another_type_leaves_the_keys_of_the_default_aside(order):
+    defaults = {"observation": {"type": "Kinematics", "absolute": True}}
+    values = {("observation", "horizon"): 5, ("observation", "type"): "TimeToCollision"}
+    assert with_values({}, dict(list(values.items())[::order]), defaults) == {
+        "observation": {"type": "TimeToCollision", "horizon": 5}
+    }
+
+
+IDS = [
+    "highway-fast-v0",
+    "exit-v0",
+    "merge-v0",
+    "intersection-v0",
+    "roundabout-v0",
+    "u-turn-v0",
+    "two-way-v0",
+    "signalised-intersection-v0",
+]
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_what_an_environment_has_by_default_it_knows(env_id):
+    check_config(env_id, default_config(env_id))
+    check_config(env_id, {"duration": 20})
+
+
+@pytest.mark.parametrize(
+    ("env_id", "config", "message"),
+    [
+        (
+            "highway-fast-v0",
+            {"lane_count": 4},
+            "config.lane_count is not known to highway-fast-v0; the nearest is config.lanes_count",
+        ),
+        ("exit-v0", {"vehicle_density": 1}, "the nearest is config.vehicles_density"),
+        ("intersection-v0", {"vehicles_count": 9}, "the nearest is config.initial_vehicle_count"),
+        ("merge-v0", {"colision_reward": -1}, "the nearest is config.collision_reward"),
+        (
+            "highway-v0",
+            {"observation": {"type": "Kinematic"}},
+            "config.observation.type = 'Kinematic': .*; the nearest is Kinematics",
+        ),
+        (
+            "highway-v0",
+            {"observation": {"vehicles_count": 4}},
+            "config.observation.type = None: expected one of TimeToCollision",
+        ),
+        (
+            "highway-v0",
+            {"observation": {"type": "Kinematics", "feature": ["x"]}},
+            "nearest is config.observation.features",
+        ),
+        (
+            "exit-v0",
+            {"action": {"type": "DiscreteMetaAction", "target_speed": [1]}},
+            "nearest is config.action.target_speeds",
+        ),
+        (
+            "signalised-intersection-v0",
+            {"signal": {"gren": 5}},
+            "config.signal.gren is not known; the nearest is config.signal.green",
+        ),
+        ("highway-v0", {"vehicles_count": 4.5}, "config.vehicles_count = 4.5: expected a whole number >= 0"),
+        ("highway-v0", {"vehicles_count": True}, "config.vehicles_count = True: expected a whole number >= 0"),
+        ("highway-v0", {"duration": "long"}, "config.duration = 'long': expected a finite number, such as 40"),
+        ("highway-v0", {"duration": float("nan")}, "config.duration = nan: expected a finite number"),
+        ("highway-v0", {"normalize_reward": 0}, "config.normalize_reward = 0: expected true or false"),
+        ("highway-v0", {"observation": "Kinematics"}, "config.observation = 'Kinematics': expected keys with values"),
+        (
+            "highway-v0",
+            {"reward_speed_range": [30, 20]},
+            "config.reward_speed_range = .*: expected two numbers, the smaller first",
+        ),
+        (
+            "exit-v0",
+            {"observation": {"type": "ExitObservation", "clip": 1}},
+            "config.observation.clip = 1: expected true or false",
+        ),
+        ("CartPole-v1", {"length": 1}, "expected an environment of highway-env; this one has no configuration"),
+        ("no-such-road-v0", {}, "env_id = 'no-such-road-v0'"),
+    ],
+)
+def test_what_an_environment_would_ignore_or_not_understand_is_named(env_id, config, message):
+    with pytest.raises(ValueError, match=message):
+        check_config(env_id, config)
+
+
+@pytest.mark.parametrize(
+    ("env_id", "config"),
+    [
+        ("merge-v0", {"duration": 30}),
+        ("roundabout-v0", {"on_road_reward": 1}),
+        ("highway-v0", {"on_road_reward": 0.1}),
+        ("exit-v0", {"initial_lane_id": 2, "other_vehicles_type": "highway_env.vehicle.behavior.DefensiveVehicle"}),
+        ("highway-v0", {"observation": {"type": "TimeToCollision", "horizon": 5}}),
+    ],
+)
+def test_what_it_knows_without_a_default_is_taken(env_id, config):
+    check_config(env_id, config)
