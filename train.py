@@ -495,7 +495,8 @@ def fail(message: str) -> NoReturn:
     raise SystemExit(2)
 
 
-if __name__ == "__main__":
+def run(arguments: list[str]) -> None:
+    """What a command line asks for."""
     # worker processes are forked from a server that has imported the slow packages once
     multiprocessing.set_forkserver_preload(
         [
@@ -506,4 +507,8 @@ if __name__ == "__main__":
             "rss_shield.eval.rollout",
         ]
     )
-    main(sys.argv[1:])
+    main(arguments)
+
+
+if __name__ == "__main__":
+    run(sys.argv[1:])

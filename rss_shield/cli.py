@@ -3,6 +3,8 @@
 import importlib
 import sys
 
+from rss_shield.eval.interrupt import stop_on_interrupt
+
 COMMANDS = {"train": ("rss_shield.train", "train", "train with and without the shield, test, compare")}
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"
 
@@ -17,6 +19,8 @@ def main(argv: list[str] | None = None) -> None:
     if name not in COMMANDS:
         sys.exit(f"rss-shield: unknown command {name!r}; expected one of {', '.join(COMMANDS)}")
     module, extra, _ = COMMANDS[name]
+    # before all that takes its time
+    stop_on_interrupt(f"rss-shield {name}: stopping; nothing that is finished is lost, --resume goes on")
     try:
         command = importlib.import_module(module)
     except ModuleNotFoundError as error:

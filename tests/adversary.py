@@ -13,10 +13,11 @@ import numpy as np
 from rss_shield.shield._numba.compiled import compiled_for_arrays as compiled
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import frames_for
+from rss_shield.shield.definitions.response import LAT, LON
 from rss_shield.shield.geometry import half_extents, largest_half_extents
 from rss_shield.shield.lanes.controller import Body, always_on, find_danger, respond, restrict
 from rss_shield.shield.lanes.judge import judge_contact, judge_frame
-from rss_shield.shield.lanes.memory import LAT, LON, MEMORY, merge, remember
+from rss_shield.shield.lanes.memory import MEMORY, merge, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.params import PRESETS, RSSParams, Rules
 

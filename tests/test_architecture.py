@@ -23,7 +23,7 @@ ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
 MAY_IMPORT = {
     "shield._numba": set(),
     "shield.params": set(),
-    "shield.definitions": LAWS | {"shield.anything"},
+    "shield.definitions": LAWS | {"shield.anything", "shield.geometry"},
     "shield.risk": LAWS | OWES,
     "shield.lanes": LAWS | OWES,
     "shield.junctions": LAWS | OWES | {"shield.lanes"},  # a verdict is one on either kind of road

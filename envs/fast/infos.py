@@ -9,10 +9,10 @@ import numpy as np
 from rss_shield.envs.fast.config import EXIT, INTERSECTION, Scenario
 from rss_shield.envs.options import Settings
 from rss_shield.shield.comfort import Comfort
+from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.junctions.plans import PLAN_NAMES
 from rss_shield.shield.lanes.controller import response_name
 from rss_shield.shield.lanes.judge import DUTIES, VERDICTS
-from rss_shield.shield.lanes.memory import AXES
 
 
 def _names(texts) -> np.ndarray:

@@ -11,6 +11,7 @@ from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, road_thro
 from rss_shield.envs.roads.steering import MAX_SLIP
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
+from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
 from rss_shield.shield.lanes.controller import (
     Body,
@@ -21,7 +22,7 @@ from rss_shield.shield.lanes.controller import (
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
 from rss_shield.shield.lanes.judge import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
-from rss_shield.shield.lanes.memory import AXES, MEMORY, catch_up, forget_safe
+from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 
 # of a car that had its contact before there was a shield on it

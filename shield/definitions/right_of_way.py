@@ -23,8 +23,8 @@ from rss_shield.shield.definitions.kinematics import (
     time_to_cover_braking,
 )
 from rss_shield.shield.definitions.longitudinal import d_min_following, euler_margin, is_safe_longitudinally
+from rss_shield.shield.definitions.response import FRONT, REAR, lateral_response, longitudinal_response
 from rss_shield.shield.geometry import signed_gap
-from rss_shield.shield.lanes.memory import FRONT, REAR, lateral_response, longitudinal_response
 
 STOP, ORDER, APART = 1, 2, 4  # items of Def. 17 that hold; 0 = none: dangerous
 

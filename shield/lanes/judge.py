@@ -22,16 +22,11 @@ from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import forward_reach, speed_envelope, travel
 from rss_shield.shield.definitions.lateral import approach_no_credit, lateral_euler_margin
 from rss_shield.shield.definitions.longitudinal import euler_margin
+from rss_shield.shield.definitions.response import FRONT, LAT, LON, NEVER, lateral_speed_limit, longitudinal_response
 from rss_shield.shield.lanes.memory import (
-    FRONT,
-    LAT,
-    LON,
     MEMORY,
-    NEVER,
     catch_up,
     forget_safe,
-    lateral_speed_limit,
-    longitudinal_response,
     owes,
     remember,
     role_of_ego,

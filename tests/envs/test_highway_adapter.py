@@ -11,8 +11,8 @@ from rss_shield import PRESETS, Rules, make
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import road_through
+from rss_shield.shield.definitions.response import LAT, LON
 from rss_shield.shield.geometry import locate
-from rss_shield.shield.lanes.memory import LAT, LON
 
 DT = 1 / 15
 TABLE = PRESETS["simulator"]

@@ -12,8 +12,8 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import heading_of, reach_of, road_through
 from rss_shield.envs.worlds.random_roads import Element, Pose, advance, lane_beside
+from rss_shield.shield.definitions.response import NEVER
 from rss_shield.shield.geometry import AROUND, locate, nearest_piece
-from rss_shield.shield.lanes.memory import NEVER
 
 DT = 1 / 15
 TABLE = PRESETS["simulator"]

@@ -25,7 +25,8 @@ from rss_shield.shield.definitions.longitudinal import (
     d_min_same_direction,
     is_safe_longitudinally,
 )
-from rss_shield.shield.lanes.memory import LAT, MEMORY, lateral_response, owes_braking, remember
+from rss_shield.shield.definitions.response import LAT, lateral_response
+from rss_shield.shield.lanes.memory import MEMORY, owes_braking, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.params import PRESETS, RSSParams, Rules
 

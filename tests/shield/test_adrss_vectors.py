@@ -30,6 +30,19 @@ from rss_shield.shield.definitions.longitudinal import (
     d_min_same_direction,
     is_safe_longitudinally,
 )
+from rss_shield.shield.definitions.response import (
+    CORRECT,
+    FRONT,
+    LAT,
+    LON,
+    NEVER,
+    REAR,
+    WRONG,
+    braking_owed,
+    lateral_response,
+    lateral_speed_limit,
+    step_threshold,
+)
 from rss_shield.shield.definitions.right_of_way import (
     APART,
     ORDER,
@@ -60,19 +73,6 @@ from rss_shield.shield.definitions.unstructured import (
     who_stays,
 )
 from rss_shield.shield.geometry import signed_gap
-from rss_shield.shield.lanes.memory import (
-    CORRECT,
-    FRONT,
-    LAT,
-    LON,
-    NEVER,
-    REAR,
-    WRONG,
-    braking_owed,
-    lateral_response,
-    lateral_speed_limit,
-    step_threshold,
-)
 from rss_shield.shield.params import PRESETS, RSSParams
 
 FILE = json.loads((DATA / "adrss-vectors.json").read_text())

@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from rss_shield.shield.lanes.memory import LAT, LON, MEMORY, NEVER, owes, step_threshold
+from rss_shield.shield.definitions.response import LAT, LON, NEVER, step_threshold
+from rss_shield.shield.lanes.memory import MEMORY, owes
 
 S, U = True, False  # safe, unsafe
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rss_shield.shield.definitions.longitudinal import d_min_same_direction
-from rss_shield.shield.lanes.memory import CORRECT, FRONT, REAR, WRONG, braking_owed, longitudinal_response
+from rss_shield.shield.definitions.response import CORRECT, FRONT, REAR, WRONG, braking_owed, longitudinal_response
 from rss_shield.shield.params import PRESETS
 
 # rho 1 s, acceleration 3.5, braking 4 to 8, in its own lane 3 m/s^2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rss_shield.shield.definitions.lateral import approach_no_credit, d_min_lateral, lateral_euler_margin
-from rss_shield.shield.lanes.memory import lateral_response, lateral_speed_limit
+from rss_shield.shield.definitions.response import lateral_response, lateral_speed_limit
 from rss_shield.shield.params import PRESETS
 
 # rho 1 s, lateral acceleration 0.2, lateral braking 0.8 m/s^2

@@ -25,6 +25,18 @@ from rss_shield.shield.definitions.longitudinal import (
 )
 from rss_shield.shield.definitions.occlusion import is_exonerated_by_mean_speed, mean_speed_until_contact, v_visible
 from rss_shield.shield.definitions.pedestrians import Walk, reach_ahead
+from rss_shield.shield.definitions.response import (
+    CORRECT,
+    FRONT,
+    LAT,
+    LON,
+    NEVER,
+    REAR,
+    WRONG,
+    lateral_response,
+    longitudinal_response,
+    step_threshold,
+)
 from rss_shield.shield.definitions.right_of_way import (
     Approach,
     can_stop_before,
@@ -59,20 +71,7 @@ from rss_shield.shield.definitions.unstructured import (
 )
 from rss_shield.shield.geometry import half_extents, locate, make_road
 from rss_shield.shield.lanes.judge import VERDICTS, judge_contact, judge_frame
-from rss_shield.shield.lanes.memory import (
-    CORRECT,
-    FRONT,
-    LAT,
-    LON,
-    MEMORY,
-    NEVER,
-    REAR,
-    WRONG,
-    lateral_response,
-    longitudinal_response,
-    remember,
-    step_threshold,
-)
+from rss_shield.shield.lanes.memory import MEMORY, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.params import PRESETS, Rules
 

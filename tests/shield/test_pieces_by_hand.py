@@ -10,12 +10,13 @@ from highway_env.vehicle.kinematics import Vehicle
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.shield._numba.compiled import compiled
+from rss_shield.shield.definitions.response import LAT, LON, NEVER
 from rss_shield.shield.geometry import make_road
 from rss_shield.shield.junctions.plans import THREAT, farthest, fastest, nearest
 from rss_shield.shield.lanes.controller import always_on
 from rss_shield.shield.lanes.frame import to_lane_frame
 from rss_shield.shield.lanes.judge import EGO, INHERITED, TOO_WEAK, judge_contact
-from rss_shield.shield.lanes.memory import LAT, LON, MEMORY, NEVER, forget_safe
+from rss_shield.shield.lanes.memory import MEMORY, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, toward
 from rss_shield.shield.params import PRESETS, Rules
 
