@@ -324,8 +324,8 @@ def examined_table(config: Config, look: Look = played) -> Table:
 
 
 MAKERS = {"progress": progress_table, "intent": intent_table, "examined": examined_table}
-LEGEND = """Rates: 95 % Wilson intervals; differences and delays: paired, 95 % bootstrap intervals, in brackets the number
-of pairs; at fault: upper end of the interval; trapped frames: no plan stayed clear of everybody."""
+LEGEND = """Rates: 95 % Wilson intervals; differences and delays: paired, 95 % bootstrap intervals, in brackets the
+number of pairs; at fault: upper end of the interval; trapped frames: no plan stayed clear of everybody."""
 
 
 # ---------------------------------------------------------------- page
