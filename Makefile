@@ -46,7 +46,7 @@ check: $(VENV)/installed-dev  ## lint, formatting and types
 	$(BIN)/mypy
 
 clean:           ## remove the environment and every cache; runs/ stays
-	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) build docs/_build docs/api *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
 	find . -name __pycache__ -type d -not -path './$(VENV)/*' -prune -exec rm -rf {} +
 
 # A stamp is newer than what it was made from, or the step runs again.
