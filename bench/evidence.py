@@ -289,6 +289,9 @@ POLICIES = {
 HEADLINES = ("fast-random", "fast-faster", "merge-random", "roundabout-random", "intersection-random")
 
 
+COUNTED = ["blame", "crashed", "return", "override_share", "broken_duties", "dangerous_pairs"]
+
+
 class Played(NamedTuple):
     """All episodes of one file in the folder of results."""
 
@@ -307,7 +310,7 @@ def found(out: Path) -> list[Played]:
         if name in CASES and mode in MODES:
             largest[name, mode, "fast" if _size(path) else "highway-env"] = path
     keys = sorted(largest, key=lambda key: list(CASES).index(key[0]))
-    return [Played(*key, pd.read_csv(largest[key], keep_default_na=False)) for key in keys]
+    return [Played(*key, pd.read_csv(largest[key], usecols=COUNTED, keep_default_na=False)) for key in keys]
 
 
 def _size(path: Path) -> int:
@@ -331,20 +334,31 @@ def page_row(played: Played) -> list[str]:
     frame, n = played.frame, len(played.frame)
     at_fault = faults(frame)
     count = {verdict: int((frame["blame"] == verdict).sum()) for verdict in ("other", "inherited", "none")}
-    whose = {"the ego's": at_fault, "others'": count["other"], "inherited": count["inherited"], "none": count["none"]}
-    doing = ", ".join(f"{spaced(number)} {name}" for name, number in whose.items() if number)
+    whose = {"the ego's": at_fault, "others'": count["other"], "inherited": count["inherited"]}
+    whose |= {"unexplained": count["none"]}
     returns = bootstrap_mean(frame["return"], np.random.default_rng(0))
-    contacts = int(frame["crashed"].sum())
     return [
         label(CASES[played.name]),
         spaced(n),
-        f"{spaced(contacts)}: {doing}" if doing else spaced(contacts),
-        f"{spaced(at_fault)} ({100 * wilson(at_fault, n).high:.2g} %)",
+        contacts_of(int(frame["crashed"].sum()), {name: number for name, number in whose.items() if number}),
+        f"{spaced(at_fault)} ({percent(wilson(at_fault, n).high)})",
         spaced(count["none"]),
         f"{spaced(int(frame['broken_duties'].sum()))} / {spaced(int(frame['dangerous_pairs'].sum()))}",
         f"{100 * frame['override_share'].mean():.0f} %",
         f"{returns.value:.2f} [{returns.low:.2f}, {returns.high:.2f}]",
     ]
+
+
+def contacts_of(count: int, whose: dict[str, int]) -> str:
+    """A number of contacts, and with whose doing they were: "438: 437 the ego's, 1 others'"."""
+    if len(whose) < 2:
+        return ", ".join([spaced(count), *whose])
+    return f"{spaced(count)}: {', '.join(f'{spaced(number)} {name}' for name, number in whose.items())}"
+
+
+def percent(share: float) -> str:
+    """Two digits at least: 0.38 %, 47 %, 100 %."""
+    return f"{100 * share:.0f} %" if share >= 0.095 else f"{100 * share:.2g} %"
 
 
 def faults(frame: pd.DataFrame) -> int:
@@ -395,7 +409,7 @@ def headlines(everything: list[Played]) -> str:
             (
                 label(CASES[name]),
                 "–" if bare is None else f"{100 * faults(bare) / len(bare):.0f} % of {spaced(len(bare))}",
-                f"**{at_fault}** ({100 * wilson(at_fault, n).high:.2g} %)",
+                f"**{at_fault}** ({percent(wilson(at_fault, n).high)})",
                 spaced(n),
                 f"{100 * frame['override_share'].mean():.0f} %",
             )

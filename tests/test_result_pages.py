@@ -48,11 +48,21 @@ def root(tmp_path):
 def test_a_row_says_whose_doing_contacts_were(root):
     played = {one.mode: one for one in evidence.found(root / "out") if one.name == "fast-random"}
     row = evidence.page_row(played["override"])
-    assert row[:3] == ["`highway-fast-v0`, random", "4", "1: 1 others'"]
+    assert row[:3] == ["`highway-fast-v0`, random", "4", "1, others'"]
     # Wilson's upper end for 0 of 4: z^2 / (4 + z^2) = 3.841 / 7.841 = 0.49
     assert row[3:7] == ["0 (49 %)", "0", "0 / 10 000", "38 %"]
     assert row[7].startswith("21.50 [")
-    assert evidence.page_row(played["monitor"])[2] == "3: 3 the ego's"
+    assert evidence.page_row(played["monitor"])[2] == "3, the ego's"
+
+
+def test_contacts_of_several_kinds_are_told_apart():
+    assert evidence.contacts_of(0, {}) == "0"
+    assert evidence.contacts_of(1438, {"the ego's": 1437, "others'": 1}) == "1 438: 1 437 the ego's, 1 others'"
+
+
+@pytest.mark.parametrize(("share", "text"), [(3.84e-5, "0.0038 %"), (0.013, "1.3 %"), (0.0965, "10 %"), (1.0, "100 %")])
+def test_percentages_have_two_digits(share, text):
+    assert evidence.percent(share) == text
 
 
 def test_engine_and_highway_env_and_kinds_of_road_stand_apart(root):
