@@ -1,6 +1,7 @@
 """Pages of results, written by the commands that measure.
 
-`python -m rss_shield.eval.pages` collects the runs of `train.py` below runs/ into docs/results/ppo.md.
+`python -m rss_shield.eval.pages runs/highway-fast-v0 runs/intersection-v0` puts these runs of `train.py` on the page
+docs/results/ppo.md; without names, all below runs/.
 """
 
 import json
@@ -55,24 +56,28 @@ def fill(path: Path, name: str, block: str) -> None:
 # ---------------------------------------------------------------- runs of train.py
 
 
+PPO_PAGE = Path("docs/results/ppo.md")
 PPO_HEADER = """# PPO with and without the shield
 
 Written by `python -m rss_shield.eval.pages` from the runs of `train.py` below `runs/`."""
 
 
-def ppo_page(runs: Path) -> list[str]:
-    """The parts of the page of trained agents: a table per finished run, and what the columns mean."""
+def ppo_page(runs: Iterable[Path]) -> list[str]:
+    """The parts of the page of trained agents: a table per finished run, and what its rows mean."""
     parts = [PPO_HEADER]
     legends: list[str] = []
-    for path in sorted(runs.glob("*/results.json")):
+    for run in runs:
+        path = run / "results.json"
+        if not path.exists():
+            continue
         results = json.loads(path.read_text(encoding="utf-8"))
         summary = pd.DataFrame(results["cells"])
         frame = table_frame(summary)
-        title, config = path.with_name("table.md").read_text(encoding="utf-8").splitlines()[0], results["config"]
-        parts += [f"## `{config['env_id']}`, {path.parent.name}", f"{title}.", f"```sh\n{command(config)}\n```"]
-        parts += [markdown([frame.columns, *frame.itertuples(index=False)]), *_replayed(results["replays"])]
+        title, config = (run / "table.md").read_text(encoding="utf-8").splitlines()[0], results["config"]
+        parts += [f"## `{config['env_id']}`, {run.name}", f"{title}.", f"```sh\n{command(config)}\n```"]
+        parts += [markdown(_turned(frame)), *_replayed(results["replays"])]
         legends.append(legend(summary))
-    return [*parts, "## What the columns mean", max(legends, key=len)] if legends else parts
+    return [*parts, "## What the rows mean", max(legends, key=len)] if legends else parts
 
 
 def command(config: dict[str, Any]) -> str:
@@ -86,14 +91,20 @@ def command(config: dict[str, Any]) -> str:
     return " ".join(map(str, words))
 
 
+def _turned(frame: pd.DataFrame) -> list[list[str]]:
+    """The cells of the comparison side by side, a metric a row."""
+    cells = list(frame["train"] + " / " + frame["test"])
+    return [["train / test", *cells], *([name, *frame[name]] for name in frame.columns[2:])]
+
+
 def _replayed(replays: list[dict[str, Any]]) -> list[str]:
     return [verdict(pd.DataFrame(replays))] if replays else []
 
 
-def main(runs: Path, page: Path) -> None:
-    write_page(page, ppo_page(runs))
-    print(f"written: {page}")
+def main(runs: list[Path]) -> None:
+    write_page(PPO_PAGE, ppo_page(runs or sorted(Path("runs").iterdir())))
+    print(f"written: {PPO_PAGE}")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "runs"), Path("docs/results/ppo.md"))
+    main([Path(name) for name in sys.argv[1:]])
