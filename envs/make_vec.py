@@ -1,6 +1,5 @@
 """Many environments at once, on either simulator."""
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -14,17 +13,7 @@ from rss_shield.envs.arguments import rules_of, seed_of, whole
 from rss_shield.envs.fast.config import Unsupported, compile_scenario
 from rss_shield.envs.fast.vector import FastVectorEnv
 from rss_shield.envs.make import make
-from rss_shield.envs.options import (
-    MODES,
-    PLANS,
-    Params,
-    check_conduct,
-    check_environment,
-    check_options,
-    check_params,
-    settings_for,
-)
-from rss_shield.shield.params import Rules
+from rss_shield.envs.options import MODES, PLANS, Options, Params, Settings, check_environment, settings_for, split
 
 BACKENDS = ("fast", "highway-env")
 
@@ -35,17 +24,9 @@ def make_vec(
     shield: str | None = "override",
     backend: str = "fast",
     params: Params = None,
-    rules: Rules | Mapping[str, Any] = Rules(),
-    intervention_penalty: float = 0.0,
-    penalty_on: str = "response",
     config: dict | None = None,
     threads: int = 1,
     autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
-    entry: str = "cautious",
-    intent: str = "any",
-    waiting: str = "line",
-    examine: str = "table",
-    traffic: str = "stock",
     **kwargs: Any,
 ) -> VectorEnv:
     """Environments side by side, each with a shield around its ego.
@@ -58,11 +39,12 @@ def make_vec(
       num_envs: how many.
       shield: "override", "monitor", or None for bare environments.
       backend: "fast", the compiled engine, or "highway-env", the original one after the other.
-      params, rules, intervention_penalty, penalty_on, entry, intent, waiting, examine, traffic: see `ShieldWrapper`.
+      params: the table in force, see `ShieldWrapper`.
       config: as for `gymnasium.make` of a highway-env environment.
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
-      kwargs: `max_episode_steps`, and whatever else `make` takes (`judge_params`, ...) where the backend is
+      kwargs: `max_episode_steps`; `rules`, `intervention_penalty`, `penalty_on`, `entry`, `intent`, `waiting` and
+        `examine` of `ShieldWrapper`; and whatever else `make` takes (`judge_params`, ...) where the backend is
         "highway-env".
 
     Raises:
@@ -77,40 +59,40 @@ def make_vec(
         raise ValueError(f"backend = {backend!r}: expected one of {', '.join(BACKENDS)}")
     if shield is not None and shield not in MODES:
         raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
-    check_options(shield or MODES[0], intervention_penalty, penalty_on, traffic)
+    given, rest = split({"params": params, **kwargs})
+    options = Options.of(given)
     if backend == "highway-env":
-        options: dict[str, Any] = dict(
-            params=params,
-            rules=rules,
-            intervention_penalty=intervention_penalty,
-            penalty_on=penalty_on,
-            config=config,
-            traffic=traffic,
+        arguments = {**given, **rest, "config": config}
+        return _SideBySide(
+            [partial(_make_counted, env_id, shield, arguments)] * num_envs, autoreset_mode=autoreset_mode
         )
-        options |= dict(entry=entry, intent=intent, waiting=waiting, examine=examine) | kwargs
-        return _SideBySide([partial(_make_counted, env_id, shield, options)] * num_envs, autoreset_mode=autoreset_mode)
-    unsupported = {"traffic": traffic} if traffic != "stock" else {}
-    unsupported |= {
-        name: value
-        for name, value in kwargs.items()
-        if value is not None and value is not False and name != "max_episode_steps"
-    }
-    for name, value in unsupported.items():
-        raise Unsupported(f"{name} = {value!r}", "backend = 'highway-env'")
-    scenario = compile_scenario(env_id, config, max_episode_steps=kwargs.get("max_episode_steps"))
-    settings = None
-    if shield is not None:
-        stock = scenario.stock
-        check_environment(stock)
-        conduct = check_conduct(entry, intent, waiting, examine)
-        settings = settings_for(stock, check_params(params, stock), rules_of(rules), shield, conduct)
-        if settings.scheme == PLANS and not isinstance(stock.action_type, DiscreteMetaAction):
-            kind = type(stock.action_type).__name__
-            raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
-    by_change, penalty = penalty_on == "change", float(intervention_penalty)
+    _check_supported(options, rest)
+    scenario = compile_scenario(env_id, config, max_episode_steps=rest.get("max_episode_steps"))
+    settings = _settings_in(scenario.stock, shield, options) if shield is not None else None
+    penalty, by_change = float(options.intervention_penalty), options.penalty_on == "change"
     return FastVectorEnv(scenario, num_envs, settings, penalty, autoreset_mode, threads, by_change)
 
 
+def _check_supported(options: Options, rest: dict[str, Any]) -> None:
+    """Does the engine know all that is asked for?"""
+    unknown = {name: getattr(options, name) for name in _OF_HIGHWAY_ENV}
+    unknown = {name: value for name, value in unknown.items() if value != _OF_HIGHWAY_ENV[name]}
+    others = {name: value for name, value in rest.items() if value is not None and name != "max_episode_steps"}
+    for name, value in (unknown | others).items():
+        raise Unsupported(f"{name} = {value!r}", "backend = 'highway-env'")
+
+
+def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
+    check_environment(stock)
+    settings = settings_for(stock, options.params_in(stock), rules_of(options.rules), shield, options.conduct)
+    if settings.scheme == PLANS and not isinstance(stock.action_type, DiscreteMetaAction):
+        kind = type(stock.action_type).__name__
+        raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
+    return settings
+
+
+# options that the engine has no answer to, and what says that nobody asks
+_OF_HIGHWAY_ENV = {"traffic": "stock", "record": False, "risk": False, "judge_params": None, "judge_rules": None}
 _OF_GYMNASIUM = {  # arguments of its `make_vec` that mean something else here
     "vectorization_mode": "backend = 'fast' or 'highway-env'",
     "vector_kwargs": "autoreset_mode and threads",

@@ -1,7 +1,9 @@
 """What may be asked of a shield, checked where it enters, and what a shield runs with."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, fields
+from difflib import get_close_matches
+from typing import Any, NamedTuple, TypedDict
 
 from highway_env.envs.common.action import ContinuousAction, DiscreteMetaAction, MultiAgentAction
 from highway_env.envs.exit_env import ExitEnv
@@ -20,6 +22,7 @@ from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
 from rss_shield.shield.junctions.plans import ANY, INTENTS
 from rss_shield.shield.params import Preset, RSSParams, Rules
+from rss_shield.shield.risk import RiskSettings
 
 LANES, PLANS = range(2)  # distances along the lane (Defs. 1-10), or plans through junctions (Defs. 14-18)
 MODES = ("override", "monitor")
@@ -53,14 +56,105 @@ class Settings(NamedTuple):
     examine: int = TABLE  # against whom plans are checked: index into `shield.junctions.examined.EXAMINED`
 
 
-def check_options(mode: str, intervention_penalty: float, penalty_on: str, traffic: str) -> None:
+class Given(TypedDict, total=False):
+    """`Options` by name, as keyword arguments, without the table."""
+
+    rules: Rules | Mapping[str, Any]
+    intervention_penalty: float
+    penalty_on: str
+    record: bool
+    entry: str
+    intent: str
+    waiting: str
+    traffic: str
+    examine: str
+    risk: bool | RiskSettings
+    judge_params: Params
+    judge_rules: Rules | Mapping[str, Any] | None
+
+
+@dataclass(frozen=True)
+class Options:
+    """What may be asked of a shield; `ShieldWrapper` says what each option means.
+
+    Raises:
+      ValueError: names the option, its value and what is expected. Tables depend on the environment: see `params_in`.
+    """
+
+    params: Params = None
+    rules: Rules | Mapping[str, Any] = field(default_factory=Rules)
+    intervention_penalty: float = 0.0
+    penalty_on: str = "response"
+    record: bool = False
+    entry: str = "cautious"
+    intent: str = "any"
+    waiting: str = "line"
+    traffic: str = "stock"
+    examine: str = "table"
+    risk: bool | RiskSettings = False
+    judge_params: Params = None
+    judge_rules: Rules | Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        number("intervention_penalty", self.intervention_penalty, 0.0)
+        for name, known in (
+            ("penalty_on", PENALTIES),
+            ("traffic", TRAFFIC),
+            ("entry", ENTRIES),
+            ("intent", INTENTS),
+            ("waiting", WAITING),
+            ("examine", EXAMINED),
+        ):
+            if getattr(self, name) not in known:
+                raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {', '.join(known)}")
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> "Options":
+        """Options by name.
+
+        Raises:
+          ValueError: a name that is none.
+        """
+        known = [option.name for option in fields(cls)]
+        for name, value in given.items():
+            if name not in known:
+                nearest = get_close_matches(name, known, n=1, cutoff=0.0)[0]
+                raise ValueError(f"{name} = {value!r}: not an option of the shield; the nearest is {nearest}")
+        return cls(**given)
+
+    @property
+    def conduct(self) -> dict[str, Any]:
+        """The fields of `Settings` that say how the ego behaves at junctions."""
+        return {
+            "entry": ENTRIES.index(self.entry),
+            "intent": INTENTS.index(self.intent),
+            "waits_anywhere": self.waiting == "anywhere",
+            "examine": EXAMINED.index(self.examine),
+        }
+
+    def params_in(self, env: Any) -> Preset:
+        """The table that the egos of an environment are restricted by; see `envs.arguments.preset_of`."""
+        return preset_of(self.params, default_preset(env), "params")
+
+    def judge_in(self, env: Any) -> tuple[Preset, Rules] | None:
+        """What they are judged by, None = what they are restricted by."""
+        if self.judge_params is None and self.judge_rules is None:
+            return None
+        own = self.judge_params is None
+        preset = self.params_in(env) if own else preset_of(self.judge_params, default_preset(env), "judge_params")
+        return preset, rules_of(self.rules) if self.judge_rules is None else rules_of(self.judge_rules, "judge_rules")
+
+
+def split(arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What is an option of the shield, and the rest."""
+    names = {option.name for option in fields(Options)}
+    given = {name: value for name, value in arguments.items() if name in names}
+    return given, {name: value for name, value in arguments.items() if name not in names}
+
+
+def check_mode(mode: Any) -> None:
     if mode not in MODES:
         raise ValueError(f"mode = {mode!r}: expected one of {', '.join(MODES)}")
-    number("intervention_penalty", intervention_penalty, 0.0)
-    if penalty_on not in PENALTIES:
-        raise ValueError(f"penalty_on = {penalty_on!r}: expected one of {', '.join(PENALTIES)}")
-    if traffic not in TRAFFIC:
-        raise ValueError(f"traffic = {traffic!r}: expected one of {', '.join(TRAFFIC)}")
 
 
 def check_environment(env: Any) -> None:
@@ -115,40 +209,9 @@ def scheme_of(env: Any) -> int:
     return next(scheme for kind, scheme in _SCHEMES.items() if isinstance(env, kind))
 
 
-def check_conduct(entry: str, intent: str, waiting: str, examine: str) -> dict[str, Any]:
-    """The fields of `Settings` that say how the ego behaves at junctions."""
-    for name, value, known in (
-        ("entry", entry, ENTRIES),
-        ("intent", intent, INTENTS),
-        ("waiting", waiting, WAITING),
-        ("examine", examine, EXAMINED),
-    ):
-        if value not in known:
-            raise ValueError(f"{name} = {value!r}: expected one of {', '.join(known)}")
-    return {
-        "entry": ENTRIES.index(entry),
-        "intent": INTENTS.index(intent),
-        "waits_anywhere": waiting == "anywhere",
-        "examine": EXAMINED.index(examine),
-    }
-
-
 def default_preset(env: Any) -> str:
     """Name of the preset that states the limits of an environment's traffic."""
     return "intersection" if isinstance(env, IntersectionEnv) else "simulator"
-
-
-def check_params(params: Any, env: Any, name: str = "params") -> Preset:
-    """The table that somebody asks for in an environment; see `envs.arguments.preset_of`."""
-    return preset_of(params, default_preset(env), name)
-
-
-def judge_of(params: Any, rules: Any, own: Preset, own_rules: Rules, env: Any) -> tuple[Preset, Rules] | None:
-    """The table by which an ego is judged, None = the one by which it is restricted."""
-    if params is None and rules is None:
-        return None
-    preset = own if params is None else check_params(params, env, "judge_params")
-    return preset, own_rules if rules is None else rules_of(rules, "judge_rules")
 
 
 def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dict[str, Any]) -> Settings:

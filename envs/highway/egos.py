@@ -1,16 +1,16 @@
 """Whom a wrapper shields: whichever vehicles are the egos of its environment, at every step."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import gymnasium as gym
 
+from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
 from rss_shield.envs.highway.ego import EARLIER_CONTACT, ShieldedEgo
-from rss_shield.envs.highway.risk import RiskMeter
+from rss_shield.envs.highway.risk import RiskMeter, check_risk
 from rss_shield.envs.highway.step import attach, shield_on
-from rss_shield.envs.options import Settings
-from rss_shield.shield.risk import RiskSettings
+from rss_shield.envs.options import Options, Settings, check_mode, settings_for
 
 
 class EgoShields(gym.Wrapper):
@@ -20,15 +20,18 @@ class EgoShields(gym.Wrapper):
     shields. A car that becomes an ego between two steps gets one; what counts since reset goes on.
     """
 
-    record: bool
-    traffic: str
-    risk: RiskSettings | None
     _settings: Settings
     _judge: Settings | None  # what the egos are judged by, where that is not what they are restricted by
     _egos: list[ShieldedEgo]  # shields of the last step, in the order of the vehicles
 
-    def __init__(self, env: gym.Env) -> None:
+    def __init__(self, env: gym.Env, mode: str, given: Mapping[str, Any]) -> None:
         super().__init__(env)
+        check_mode(mode)
+        self.mode, self.options = mode, Options.of(given)
+        self._check()
+        self.params, self.rules = self.options.params_in(env.unwrapped), rules_of(self.options.rules)
+        self.judge = self.options.judge_in(env.unwrapped)
+        self.risk = check_risk(self.options.risk)
         inner: gym.Env = env
         while isinstance(inner, gym.Wrapper):
             if isinstance(inner, EgoShields):
@@ -54,11 +57,12 @@ class EgoShields(gym.Wrapper):
 
     def _current_settings(self) -> Settings:
         """Settings for the environment as it is now."""
-        raise NotImplementedError
+        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.options.conduct)
 
     def _judge_settings(self) -> Settings | None:
         """What the egos are judged by, where that is not what they are restricted by."""
-        raise NotImplementedError
+        conduct = self.options.conduct
+        return settings_for(self.env.unwrapped, *self.judge, "monitor", conduct) if self.judge else None
 
     def _begin(self) -> None:
         """Put new shields on for a new episode."""
@@ -84,7 +88,7 @@ class EgoShields(gym.Wrapper):
         for shield in list(egos_on(env)):
             if shield not in self._egos:
                 _take_off(shield)
-        if self.traffic == "compliant":
+        if self.options.traffic == "compliant":
             shield_everybody(env.road, self._settings)
         return self._egos
 
@@ -96,8 +100,10 @@ class EgoShields(gym.Wrapper):
             )
         shield = shield_on(vehicle)
         if shield is None or not shield.is_ego:
-            among = self.traffic == "compliant"
-            shield = attach(vehicle, self._settings, self.record, env.config.get("destination"), among, self._judge)
+            among = self.options.traffic == "compliant"
+            shield = attach(
+                vehicle, self._settings, self.options.record, env.config.get("destination"), among, self._judge
+            )
             shield.is_ego = True
             shield.meter = RiskMeter(self.risk) if self.risk is not None else None
             if vehicle.crashed:

@@ -1,34 +1,20 @@
 """MultiAgentShield: several controlled vehicles, each with a shield of its own."""
 
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
-from rss_shield.envs.arguments import actions_of, plain, rules_of, seed_of
+from rss_shield.envs.arguments import actions_of, plain, seed_of
 from rss_shield.envs.highway.ego import Frame
 from rss_shield.envs.highway.egos import EgoShields
-from rss_shield.envs.highway.risk import check_risk
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of
 from rss_shield.envs.highway.wrapper import traffic_info
-from rss_shield.envs.options import (
-    Params,
-    Settings,
-    check_action_type,
-    check_conduct,
-    check_kind,
-    check_options,
-    check_params,
-    judge_of,
-    settings_for,
-)
+from rss_shield.envs.options import Given, Params, check_action_type, check_kind
 from rss_shield.envs.stock import check_frequencies
 from rss_shield.shield.lanes.judge import Audit
-from rss_shield.shield.params import Rules
-from rss_shield.shield.risk import RiskSettings
 
 
 class MultiAgentShield(EgoShields, RecordConstructorArgs):
@@ -52,53 +38,10 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
       ValueError: as `ShieldWrapper`.
     """
 
-    def __init__(
-        self,
-        env: gym.Env,
-        mode: str = "override",
-        params: Params = None,
-        intervention_penalty: float = 0.0,
-        penalty_on: str = "response",
-        rules: Rules | Mapping[str, Any] = Rules(),
-        record: bool = False,
-        entry: str = "cautious",
-        intent: str = "any",
-        waiting: str = "line",
-        traffic: str = "stock",
-        examine: str = "table",
-        risk: bool | RiskSettings = False,
-        judge_params: Params = None,
-        judge_rules: Rules | Mapping[str, Any] | None = None,
-    ) -> None:
-        RecordConstructorArgs.__init__(
-            self,
-            mode=mode,
-            params=plain(params),
-            intervention_penalty=plain(intervention_penalty),
-            penalty_on=penalty_on,
-            rules=plain(rules),
-            record=record,
-            entry=entry,
-            intent=intent,
-            waiting=waiting,
-            traffic=traffic,
-            examine=examine,
-            risk=risk,
-            judge_params=plain(judge_params),
-            judge_rules=plain(judge_rules),
-        )
-        check_options(mode, intervention_penalty, penalty_on, traffic)
-        check_agents(env.unwrapped)
-        EgoShields.__init__(self, env)
-        self.mode = mode
-        self.params = check_params(params, env.unwrapped)
-        self.conduct = check_conduct(entry, intent, waiting, examine)
-        self.rules = rules_of(rules)
-        self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
-        self.intervention_penalty, self.penalty_on = float(intervention_penalty), penalty_on
-        self.record = record
-        self.traffic = traffic
-        self.risk = check_risk(risk)
+    def __init__(self, env: gym.Env, mode: str = "override", params: Params = None, **options: Unpack[Given]) -> None:
+        given = {"params": params, **options}
+        RecordConstructorArgs.__init__(self, mode=mode, **{name: plain(value) for name, value in given.items()})
+        EgoShields.__init__(self, env, mode, given)
         self._begin()
 
     @property
@@ -108,7 +51,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         Raises:
           ValueError: the wrapper was made without `record=True`.
         """
-        if not self.record:
+        if not self.options.record:
             raise ValueError("record = False: expected True to keep the frames of an episode")
         return tuple(ego.record or [] for ego in self._guard())
 
@@ -134,8 +77,8 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         egos = self._guard_after_step(egos)
         agents = tuple(end_step(*one) for one in zip(egos, had_contact, action, strict=True))
         info.update(agents=agents, raw_reward=reward, **traffic_info(self))
-        if self.intervention_penalty > 0.0:
-            charges = [charge(agent, self.intervention_penalty, self.penalty_on) for agent in agents]
+        if self.options.intervention_penalty > 0.0:
+            charges = [charge(agent, self.options) for agent in agents]
             if isinstance(reward, tuple):
                 reward = tuple(r - c for r, c in zip(reward, charges, strict=True))
             else:
@@ -144,12 +87,6 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
 
     def _check(self) -> None:
         check_agents(self.env.unwrapped)
-
-    def _current_settings(self) -> Settings:
-        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
-
-    def _judge_settings(self) -> Settings | None:
-        return settings_for(self.env.unwrapped, *self.judge, "monitor", self.conduct) if self.judge else None
 
 
 def outcome_of_agents(env: Any, actions: tuple) -> tuple[list[float], list[bool]]:

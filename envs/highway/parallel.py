@@ -94,9 +94,8 @@ class ShieldedParallelEnv(ParallelEnv):
         earned, ended = info.get("agents_rewards"), info.get("agents_terminated")
         if earned is None:  # an intersection says it, and its traffic has moved on since
             earned, ended = outcome_of_agents(self.env.unwrapped, joint)
-        paid = self.env.intervention_penalty, self.env.penalty_on
         infos = tuple({**one, "raw_reward": float(reward)} for one, reward in zip(info["agents"], earned, strict=True))
-        rewards = tuple(one["raw_reward"] - charge(one, *paid) for one in infos)
+        rewards = tuple(one["raw_reward"] - charge(one, self.env.options) for one in infos)
         terminations = self._of_agents([bool(one) for one in ended])
         truncations = dict.fromkeys(self.agents, bool(truncated))
         outcome = self._of_agents(observations), self._of_agents(rewards), terminations, truncations

@@ -9,7 +9,7 @@ from rss_shield.envs.highway.compliant import TurnTaker
 from rss_shield.envs.highway.ego import ShieldedEgo, StepTally, log_of
 from rss_shield.envs.highway.free_ego import FreeEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
-from rss_shield.envs.options import LANES, Settings
+from rss_shield.envs.options import LANES, Options, Settings
 from rss_shield.shield.comfort import comfort_of
 from rss_shield.shield.lanes.controller import response_name
 from rss_shield.shield.lanes.judge import Audit, audit
@@ -138,10 +138,10 @@ def tell_inside(shield: Any) -> None:
         reader.env = Told(reader.env, shield)
 
 
-def charge(info: dict[str, Any], penalty: float, penalty_on: str) -> Any:
+def charge(info: dict[str, Any], options: Options) -> Any:
     """What an ego pays for the interventions of a step: the penalty times the share of frames or the mean change."""
-    shield = info["shield"]
-    return penalty * (shield["override_fraction"] if penalty_on == "response" else shield["mean_acceleration_change"])
+    unit = "override_fraction" if options.penalty_on == "response" else "mean_acceleration_change"
+    return float(options.intervention_penalty) * info["shield"][unit]
 
 
 def audit_of(ego: ShieldedEgo) -> Audit:

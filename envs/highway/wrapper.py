@@ -1,31 +1,19 @@
 """ShieldWrapper: the RSS shield around a highway-env environment."""
 
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.intersection_env import IntersectionEnv
 
-from rss_shield.envs.arguments import action_of, plain, rules_of, seed_of
+from rss_shield.envs.arguments import action_of, plain, seed_of
 from rss_shield.envs.highway.ego import Frame, ShieldedEgo
 from rss_shield.envs.highway.egos import EgoShields
-from rss_shield.envs.highway.risk import RiskFrame, check_risk
+from rss_shield.envs.highway.risk import RiskFrame
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of, tell_inside
-from rss_shield.envs.options import (
-    Params,
-    Settings,
-    check_conduct,
-    check_environment,
-    check_options,
-    check_params,
-    judge_of,
-    settings_for,
-)
+from rss_shield.envs.options import Given, Params, check_environment
 from rss_shield.envs.stock import check_frequencies
 from rss_shield.shield.lanes.judge import Audit
-from rss_shield.shield.params import Rules
-from rss_shield.shield.risk import RiskSettings
 
 
 class ShieldWrapper(EgoShields, RecordConstructorArgs):
@@ -101,53 +89,10 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         not on the environment's road.
     """
 
-    def __init__(
-        self,
-        env: gym.Env,
-        mode: str = "override",
-        params: Params = None,
-        intervention_penalty: float = 0.0,
-        penalty_on: str = "response",
-        rules: Rules | Mapping[str, Any] = Rules(),
-        record: bool = False,
-        entry: str = "cautious",
-        intent: str = "any",
-        waiting: str = "line",
-        traffic: str = "stock",
-        examine: str = "table",
-        risk: bool | RiskSettings = False,
-        judge_params: Params = None,
-        judge_rules: Rules | Mapping[str, Any] | None = None,
-    ) -> None:
-        RecordConstructorArgs.__init__(
-            self,
-            mode=mode,
-            params=plain(params),
-            intervention_penalty=plain(intervention_penalty),
-            penalty_on=penalty_on,
-            rules=plain(rules),
-            record=record,
-            entry=entry,
-            intent=intent,
-            waiting=waiting,
-            traffic=traffic,
-            examine=examine,
-            risk=risk,
-            judge_params=plain(judge_params),
-            judge_rules=plain(judge_rules),
-        )
-        check_options(mode, intervention_penalty, penalty_on, traffic)
-        check_environment(env.unwrapped)
-        EgoShields.__init__(self, env)
-        self.mode = mode
-        self.params = check_params(params, env.unwrapped)
-        self.conduct = check_conduct(entry, intent, waiting, examine)
-        self.rules = rules_of(rules)
-        self.judge = judge_of(judge_params, judge_rules, self.params, self.rules, env.unwrapped)
-        self.intervention_penalty, self.penalty_on = float(intervention_penalty), penalty_on
-        self.record = record
-        self.traffic = traffic
-        self.risk = check_risk(risk)
+    def __init__(self, env: gym.Env, mode: str = "override", params: Params = None, **options: Unpack[Given]) -> None:
+        given = {"params": params, **options}
+        RecordConstructorArgs.__init__(self, mode=mode, **{name: plain(value) for name, value in given.items()})
+        EgoShields.__init__(self, env, mode, given)
         self._told = True
         tell_inside(self)
         self._begin()
@@ -198,7 +143,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         self._action, self._had_contact, self._told = action, begin_step(self._stepping[0]), False
         observation, reward, terminated, truncated, info = self.env.step(executed)
         self.tell(info, reward)
-        reward = reward - charge(info, self.intervention_penalty, self.penalty_on)
+        reward = reward - charge(info, self.options)
         return observation, reward, terminated, truncated, info
 
     def tell(self, info: dict, reward: Any) -> None:
@@ -221,16 +166,10 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
     def _check(self) -> None:
         check_environment(self.env.unwrapped)
 
-    def _current_settings(self) -> Settings:
-        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.conduct)
-
-    def _judge_settings(self) -> Settings | None:
-        return settings_for(self.env.unwrapped, *self.judge, "monitor", self.conduct) if self.judge else None
-
 
 def traffic_info(wrapper) -> dict[str, Any]:
     """What infos say about compliant traffic."""
-    if wrapper.traffic == "stock":
+    if wrapper.options.traffic == "stock":
         return {}
     contacts = [driver.contact for driver in wrapper.drivers if driver.check_contact()]
     return {"traffic_blame": tuple(contact["verdict"] for contact in contacts)}

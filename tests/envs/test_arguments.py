@@ -165,7 +165,7 @@ def test_a_specification_goes_through_json_and_back(env_id, options):
     again = gym.make(EnvSpec.from_json(env.spec.to_json()))
     assert again.settings == env.settings
     assert (again.params[:2], again.rules, again.mode) == (env.params[:2], env.rules, env.mode)
-    assert again.intervention_penalty == env.intervention_penalty
+    assert again.options.intervention_penalty == env.options.intervention_penalty
     assert _numbers(gym.make(env.spec), 4) == _numbers(again, 4) == _numbers(env, 4)
     assert json.loads(again.spec.to_json()) == json.loads(env.spec.to_json())
 
@@ -243,7 +243,7 @@ def test_whole_numbers_may_be_numpys(backend, kind):
 
 @pytest.mark.parametrize("penalty", [np.float32(0.25), np.int64(1), 1, np.float64(0.5)])
 def test_penalties_may_be_numpys(penalty):
-    assert make("highway-fast-v0", intervention_penalty=penalty).intervention_penalty == penalty
+    assert make("highway-fast-v0", intervention_penalty=penalty).options.intervention_penalty == penalty
     assert make_vec("highway-fast-v0", 1, intervention_penalty=penalty).engine.penalty == penalty
 
 
