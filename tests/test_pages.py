@@ -12,6 +12,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 PAGES = [path for path in PAGES if not {"_build", "api"} & set(path.relative_to(ROOT).parts)]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL)
+BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "start.md").read_text(encoding="utf-8"), re.DOTALL)
 CODE = re.compile(r"\b[HCWMJ]\d+y?\b")
 SOURCES = [path for folder in ("shield", "envs", "agents", "eval") for path in sorted((ROOT / folder).rglob("*.py"))]
 
@@ -33,6 +34,11 @@ def test_an_example_of_the_readme_prints_what_stands_below_it(code, printed):
     with contextlib.redirect_stdout(out):
         exec(compile(code, "README.md", "exec"), {})
     assert out.getvalue() == printed
+
+
+@pytest.mark.parametrize("code", BLOCKS, ids=[block.splitlines()[0][:40] for block in BLOCKS])
+def test_a_block_of_getting_started_runs(code, capsys):
+    exec(compile(code.replace("1_000", "256"), "start.md", "exec"), {})
 
 
 def test_the_readme_is_one_page_and_says_how_to_begin():
