@@ -3,6 +3,8 @@
     python bench/junctions.py                               every table, results in runs/junctions/
     python bench/junctions.py --tables progress --policies faster --durations 30
     python bench/junctions.py --episodes 100 --paired 200   a quick look
+    python bench/junctions.py --write                       nothing is played: docs/results/junctions.md from all
+                                                            that has been
 
 *Progress*: every combination of entry, waiting and duration, beside the same traffic without a shield.
 *Intent*: the same seeds with intent known, assumed straight, and unknown. *Examined*: the same seeds with
@@ -17,6 +19,7 @@ import itertools
 import json
 import sys
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,6 +33,7 @@ from rich.table import Table
 from rss_shield import make_vec
 from rss_shield.envs.roads.network import local_coordinates
 from rss_shield.eval.files import atomic
+from rss_shield.eval.pages import markdown, write_page
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.stats import Interval, bootstrap_mean, paired_difference, wilson
@@ -68,7 +72,7 @@ UNSHIELDED = Case("monitor")
 class Config:
     """Drive through intersections and count who arrives."""
 
-    tables: tuple[str, ...] = TABLES  # "progress", "intent", "examined"
+    tables: tuple[str, ...] = ()  # "progress", "intent", "examined"; all, or none with --write
     policies: tuple[str, ...] = POLICIES  # of the table of progress: "faster", "random"
     durations: tuple[int, ...] = (13, 30)  # of an episode, likewise [s]
     episodes: int = 1000  # per row of the table of progress
@@ -76,6 +80,7 @@ class Config:
     paired_duration: int = 30  # of an episode there [s]
     n_workers: int = 2  # threads of the engine
     out: Path = Path("runs/junctions")  # one CSV per case
+    write: bool = False  # the page of results, from the files in `out`
 
 
 # ---------------------------------------------------------------- episodes
@@ -83,14 +88,24 @@ class Config:
 
 def played(case: Case, count: int, config: Config) -> pd.DataFrame:
     """All episodes of one case, from its file if that is there already."""
-    path = config.out / f"{case.name}-{count}.csv"
-    if path.exists():
-        return pd.read_csv(path, keep_default_na=False)
+    there = found(case, count, config)
+    if there is not None:
+        return there
     frame = play(case, count, config.n_workers)
     config.out.mkdir(parents=True, exist_ok=True)
-    with atomic(path) as temporary:
+    with atomic(_path(case, count, config)) as temporary:
         frame.to_csv(temporary, index=False)
     return frame
+
+
+def found(case: Case, count: int, config: Config) -> pd.DataFrame | None:
+    """All episodes of one case, if they have been played."""
+    path = _path(case, count, config)
+    return pd.read_csv(path, keep_default_na=False) if path.exists() else None
+
+
+def _path(case: Case, count: int, config: Config) -> Path:
+    return config.out / f"{case.name}-{count}.csv"
 
 
 def play(case: Case, count: int, threads: int) -> pd.DataFrame:
@@ -261,56 +276,102 @@ def percent(rate: Interval, signed: bool = False) -> str:
 CONTACTS = ("contacts", "ego/both/other/inherited/none", "what others broke", "what the ego broke", "at fault")
 
 
-def progress_table(config: Config) -> Table:
+Look = Callable[[Case, int, Config], pd.DataFrame | None]  # `played`, or `found`: only what is there
+
+
+def progress_table(config: Config, look: Look = played) -> Table:
     columns = ("policy", "time", "entry", "waiting", "arrived", "after", *CONTACTS, "overridden", "trapped frames")
     table = Table(*columns, "stuck", "arrived of the rest", title=f"Progress, intent known, n = {config.episodes}")
     for policy, duration in itertools.product(config.policies, config.durations):
-        for entry, waiting in itertools.product(ENTRIES, ("line", "anywhere")):
-            case = Case(policy=policy, entry=entry, waiting=waiting, duration=duration)
-            table.add_row(*progress_row(case, played(case, config.episodes, config)))
-        case = UNSHIELDED._replace(policy=policy, duration=duration)
-        table.add_row(*progress_row(case, played(case, config.episodes, config)))
+        conduct = itertools.product(ENTRIES, ("line", "anywhere"))
+        cases = [Case(policy=policy, entry=entry, waiting=waiting, duration=duration) for entry, waiting in conduct]
+        for case in [*cases, UNSHIELDED._replace(policy=policy, duration=duration)]:
+            frame = look(case, config.episodes, config)
+            if frame is not None:
+                table.add_row(*progress_row(case, frame))
         table.add_section()
     return table
 
 
-def intent_table(config: Config) -> Table:
+def intent_table(config: Config, look: Look = played) -> Table:
     columns = ("intent", "arrived", "more than known", "after", "later than without a shield", "later than known")
     title = f"Intent, entry cautious, policy faster, {config.paired_duration} s, the same {config.paired} seeds"
     table = Table(*columns, *CONTACTS, "overridden", "stuck", title=title)
     cases = [Case(intent=intent, duration=config.paired_duration) for intent in INTENTS]
-    frames = [played(case, config.paired, config) for case in cases]
-    bare = played(UNSHIELDED._replace(duration=config.paired_duration), config.paired, config)
+    frames = [look(case, config.paired, config) for case in cases]
+    known, bare = frames[0], look(UNSHIELDED._replace(duration=config.paired_duration), config.paired, config)
+    if known is None or bare is None:
+        return table
     for case, frame in zip(cases, frames, strict=True):
-        table.add_row(*intent_row(case, frame, frames[0], bare))
+        if frame is not None:
+            table.add_row(*intent_row(case, frame, known, bare))
     return table
 
 
-def examined_table(config: Config) -> Table:
+def examined_table(config: Config, look: Look = played) -> Table:
     columns = ("examined", "pairs per frame", "of", "share", "episodes changed", "arrived", "more than all", *CONTACTS)
     title = f"Who is examined, entry cautious, intent known, policy faster, the same {config.paired} seeds"
     table = Table(*columns, "overridden", title=title)
-    everybody = played(Case(examine="all", duration=config.paired_duration), config.paired, config)
+    everybody = look(Case(examine="all", duration=config.paired_duration), config.paired, config)
+    if everybody is None:
+        return table
     for name in EXAMINED:
         case = Case(examine=name, duration=config.paired_duration)
-        table.add_row(*examined_row(case, played(case, config.paired, config), everybody))
+        frame = look(case, config.paired, config)
+        if frame is not None:
+            table.add_row(*examined_row(case, frame, everybody))
     return table
 
 
+MAKERS = {"progress": progress_table, "intent": intent_table, "examined": examined_table}
+LEGEND = """Rates: 95 % Wilson intervals; differences and delays: paired, 95 % bootstrap intervals, in brackets the
+number of pairs; at fault: upper end of the interval; trapped frames: no plan stayed clear of everybody."""
+
+
+# ---------------------------------------------------------------- page
+
+
+PAGE = Path("docs/results/junctions.md")
+HEADER = """# How far the ego comes at an intersection
+
+Written by `python bench/junctions.py --write` from what its other calls have played.
+
+`intersection-v0` in the compiled engine, the ego turns left with the lowest right of way. An episode arrives if it ends
+behind the intersection without a contact. *Stuck* are those that ran out of time while a wreck or a standing car was in
+the way. Contacts are listed by verdict: ego / both / other / inherited / none."""
+
+
+def write(config: Config, root: Path = Path()) -> None:
+    """Write the page of results below `root`; what has not been played is left out."""
+    parts = [HEADER, LEGEND]
+    for name, make_table in MAKERS.items():
+        table = make_table(config, found)
+        if table.row_count:
+            rows = zip(*(column.cells for column in table.columns), strict=True)
+            size = f"--episodes {config.episodes}" if name == "progress" else f"--paired {config.paired}"
+            command = f"```sh\npython bench/junctions.py --tables {name} {size}\n```"
+            parts += [f"## {table.title}", markdown([[column.header for column in table.columns], *rows]), command]
+    write_page(root / PAGE, parts)
+
+
+# ---------------------------------------------------------------- main
+
+
 def main(config: Config) -> int:
-    makers = {"progress": progress_table, "intent": intent_table, "examined": examined_table}
-    for name, given, known in (("tables", config.tables, makers), ("policies", config.policies, POLICIES)):
+    tables = config.tables or (() if config.write else TABLES)
+    for name, given, known in (("tables", tables, MAKERS), ("policies", config.policies, POLICIES)):
         unknown = [value for value in given if value not in known]
         if unknown:
             print(f"{name} = {unknown[0]!r}: expected some of {', '.join(known)}", file=sys.stderr)
             return 2
     console = Console(width=240)
-    for name in config.tables:
-        console.print(makers[name](config))
-    print(
-        "rates: 95 % Wilson intervals; differences and delays: paired, 95 % bootstrap intervals, in brackets the number"
-    )
-    print("of pairs; at fault: upper end of the interval; trapped frames: no plan stayed clear of everybody")
+    for name in tables:
+        console.print(MAKERS[name](config))
+    if tables:
+        print(LEGEND)
+    if config.write:
+        write(config)
+        print(f"written: {PAGE}")
     return 0
 
 

@@ -1,0 +1,110 @@
+"""Pages of results, written by the commands that measure.
+
+`python -m rss_shield.eval.pages runs/highway-fast-v0 runs/intersection-v0` puts these runs of `train.py` on the page
+docs/results/ppo.md; without names, all below runs/.
+"""
+
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from rss_shield.eval.files import write_text
+from rss_shield.eval.replay import verdict
+from rss_shield.eval.table import legend, table_frame
+
+
+def markdown(rows: Iterable[Sequence[Any]]) -> str:
+    """A Markdown table; the first row is its heading."""
+    heading, *body = [[_cell(value) for value in row] for row in rows]
+    lines = [heading, ["---"] * len(heading), *body]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _cell(value: Any) -> str:
+    return str(value).replace("|", "\\|").replace("\n", " ")
+
+
+def spaced(number: int) -> str:
+    """A whole number in groups of three digits: 7 754 999."""
+    return f"{number:,}".replace(",", " ")
+
+
+def write_page(path: Path, parts: Iterable[str]) -> None:
+    """Write a page, its parts one blank line apart; the old page stays until the new one is there."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, "\n\n".join(part.strip("\n") for part in parts) + "\n")
+
+
+def fill(path: Path, name: str, block: str) -> None:
+    """Replace what stands between `<!-- name -->` and `<!-- /name -->` in a file, and nothing else.
+
+    Raises:
+      ValueError: the file does not have each marker once, in this order.
+    """
+    text = path.read_text(encoding="utf-8")
+    begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+        raise ValueError(f"{path}: expected {begin} and {end} once each, in this order")
+    before, after = text.split(begin)[0], text.split(end)[1]
+    write_text(path, f"{before}{begin}\n{block}\n{end}{after}")
+
+
+# ---------------------------------------------------------------- runs of train.py
+
+
+PPO_PAGE = Path("docs/results/ppo.md")
+PPO_HEADER = """# PPO with and without the shield
+
+Written by `python -m rss_shield.eval.pages` from the runs of `train.py` below `runs/`."""
+
+
+def ppo_page(runs: Iterable[Path]) -> list[str]:
+    """The parts of the page of trained agents: a table per finished run, and what its rows mean."""
+    parts = [PPO_HEADER]
+    legends: list[str] = []
+    for run in runs:
+        path = run / "results.json"
+        if not path.exists():
+            continue
+        results = json.loads(path.read_text(encoding="utf-8"))
+        summary = pd.DataFrame(results["cells"])
+        frame = table_frame(summary)
+        title, config = (run / "table.md").read_text(encoding="utf-8").splitlines()[0], results["config"]
+        parts += [f"## `{config['env_id']}`, {run.name}", f"{title}.", f"```sh\n{command(config)}\n```"]
+        parts += [markdown(_turned(frame)), *_replayed(results["replays"])]
+        legends.append(legend(summary))
+    return [*parts, "## What the rows mean", max(legends, key=len)] if legends else parts
+
+
+def command(config: dict[str, Any]) -> str:
+    """The command line of a run, as far as the page tells of it."""
+    words = ["python train.py --env-id", config["env_id"], "--total-timesteps", config["total_timesteps"], "--seeds"]
+    words += config["seeds"]
+    if config["parameters"].get("roads_cross"):
+        words += ["--intent", config["intent"], "--entry", config["entry"], "--waiting", config["waiting"]]
+    if config["intervention_penalty"]:
+        words += ["--intervention-penalty", config["intervention_penalty"]]
+    return " ".join(map(str, words))
+
+
+def _turned(frame: pd.DataFrame) -> list[list[str]]:
+    """The cells of the comparison side by side, a metric a row."""
+    cells = list(frame["train"] + " / " + frame["test"])
+    return [["train / test", *cells], *([name, *frame[name]] for name in frame.columns[2:])]
+
+
+def _replayed(replays: list[dict[str, Any]]) -> list[str]:
+    return [verdict(pd.DataFrame(replays))] if replays else []
+
+
+def main(runs: list[Path]) -> None:
+    write_page(PPO_PAGE, ppo_page(runs or sorted(Path("runs").iterdir())))
+    print(f"written: {PPO_PAGE}")
+
+
+if __name__ == "__main__":
+    main([Path(name) for name in sys.argv[1:]])
