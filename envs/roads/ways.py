@@ -376,7 +376,7 @@ def track_of(roads, car, path):
 
 @compiled
 def drift_of(roads, car, track):
-    """How much further, or less far, than a plan says the ego may come because it changes lanes [m]."""
+    """How much further, or less far, than a plan says the ego may come because it changes lanes (rule J11) [m]."""
     if track.beside < 0:
         return 0.0
     lane, v = roads.lanes[car.lane], max(car.speed, 0.0)
@@ -496,8 +496,8 @@ def _fits(lane, car, before, off, turned):
 def _goes_on(roads, ways, lane):
     """Paths through a lane on which some of a set of paths go on; sets are bits.
 
-    Who is on a ring may leave it at any exit, but is not expected to go around once more. Else the ways that come up
-    with every lane lead further than those for which plans were made on the frame before.
+    Who is on a ring may leave it at any exit, but is not expected to go around once more (rule J10). Else the ways that
+    come up with every lane lead further than those for which plans were made on the frame before.
     """
     count = len(roads.onward)
     if count > _MOST_LANES:  # more than there are bits

@@ -1,12 +1,16 @@
 """Roads and frame rates that plans through junctions hold for, and those that are refused."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from rss_shield import make, make_vec
 from rss_shield.envs.roads.paths import STOCK, _starts, drive
-from rss_shield.envs.roads.ways import junction_of
+from rss_shield.envs.roads.ways import CAR_ON_ROAD, junction_of, list_threats, track_of
 from rss_shield.shield.junctions.conflict_areas import cell_of, reach_beyond
+from rss_shield.shield.junctions.controller import CROSSING, SAMPLE
+from rss_shield.shield.junctions.plans import ANY, THREAT
 
 GENERIC = "roundabout-generic-v0"
 
@@ -84,3 +88,68 @@ def test_it_is_the_frequency_that_counts():
     env.reset(seed=0)
     at = [junction_of(env.unwrapped.road.network, dt=1 / f).roads.paths.swept for f in (5, 15)]
     assert (at[0][..., 5] - at[1][..., 5]).max() > 0.1
+
+
+def follow(env_id, car, frames):
+    """Ways and strays of one car on every frame, as the ego reads them, while `car(frame)` says where it is."""
+    env = make(env_id, shield=None)
+    env.reset(seed=0)
+    junction = junction_of(env.unwrapped.road.network)
+    roads, number = junction.roads, junction.number
+    ego, other = np.zeros((2, 1), CAR_ON_ROAD)
+    start = env.unwrapped.road.network.get_lane(("ser", "ses", 0))
+    ego["x"], ego["y"] = start.position(2.0, 0.0)
+    ego["heading"], ego["length"], ego["width"] = start.heading_at(2.0), 5.0, 2.0
+    ego["on"] = ego["lane"] = number[("ser", "ses", 0)]
+    ego["choice"] = junction.choice(("ser", "ses", 0), None)
+    track = track_of(roads, ego[0], -1)
+    memory, samples, threats, box = np.zeros(1, CROSSING), np.zeros(1, SAMPLE), np.zeros(64, THREAT), np.zeros(6)
+    seen = []
+    for frame in range(frames):
+        lane, s = car(env.unwrapped.road.network, frame)
+        other["x"], other["y"] = lane.position(s, 0.0)
+        other["heading"], other["speed"], other["length"], other["width"] = lane.heading_at(s), 10.0, 5.0, 2.0
+        other["lane"] = other["choice"] = -1
+        count = list_threats(roads, track, other, memory, ANY, 20.0, samples, threats, box)
+        seen.append((set(threats["path"][:count]), bool(samples["strays"][0])))
+        for name in ("lanes", "ways", "reachable", "path"):
+            memory[name] = samples["next_lanes" if name == "lanes" else name]
+        memory["age"] += 1
+    return junction, seen
+
+
+def around(network, frame):
+    """A car that drives along the inner lane of a ring for ever, a metre on each frame."""
+    ring = [(a, b, 1) for a, b in pairwise(["ee", "nx", "ne", "wx", "we", "sx", "se", "ex", "ee"])]
+    lengths = [network.get_lane(index).length for index in ring]
+    s = frame % sum(lengths)
+    for index, length in zip(ring, lengths, strict=True):
+        if s < length:
+            return network.get_lane(index), s
+        s -= length
+    raise AssertionError
+
+
+def test_ways_on_a_ring_never_lead_further_than_before_and_who_goes_around_once_more_has_left_them():
+    lap = 150  # frames of a metre: the inner lane has a radius of 24 m
+    junction, seen = follow("roundabout-v0", around, 2 * lap)
+    strays = [frame for frame, (_, astray) in enumerate(seen) if astray]
+    assert strays and lap * 0.6 < strays[0] <= lap  # at the exit that closes the lap
+    ends = [{junction.walks[path][-1] for path in ways} for ways, _ in seen[: strays[0]]]
+    assert len(ends[0]) == 4
+    for before, now in pairwise(ends):
+        assert now <= before
+    assert len(ends[-1]) == 1
+
+
+@pytest.mark.parametrize("seed", [473, 14365])
+def test_an_ego_that_waits_to_enter_a_ring_is_not_trapped_by_a_second_lap(seed):
+    """Both ended in a contact that broke nobody's duty."""
+    env = make("roundabout-v0")
+    env.reset(seed=seed)
+    over = False
+    while not over:
+        *_, terminated, truncated, info = env.step(3)
+        over = terminated or truncated
+    assert info["blame"] == ""
+    assert info["episode_broken_duties"] == 0
