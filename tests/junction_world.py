@@ -47,6 +47,8 @@ def crossing_pairs() -> list[tuple[int, int]]:
 class Duel:
     """The ego under the shield on one path, another car that does what it likes within its bounds on a second one."""
 
+    rate = 0.0  # of anticipation [1/s]
+
     def __init__(self, ego_path, other_path, s_ego, v_ego, s_other, v_other, entry=CAUTIOUS, assumed=TABLE.other):
         self.roads = junction().roads
         self.path, self.s, self.v = ego_path, float(s_ego), float(v_ego)
@@ -55,26 +57,45 @@ class Duel:
         self.threats["cap"], self.threats["half_length"] = self.roads.limit, 2.5
         self.threats["priority"] = self.roads.paths.priority[ego_path, other_path]
         self.memory, self.plan = np.zeros(1, CROSSING), np.zeros(1, PLAN)
-        self.plan["go"] = -1
+        self.plan["go"], self.plan["held_at"] = -1, np.inf
         self.entry, self.assumed = entry, assumed
         self.report = None
 
+    def scene(self) -> Scene:
+        track = Track(self.path, self.s, self.v, 2.5, -1, 0.0)
+        return Scene(self.roads.paths, track, self.threats, EGO, self.assumed, DT)
+
     def frame(self, nominal: float, a_other: float, overrides: bool = True) -> None:
         """One frame; the other car's acceleration is cut to what it can do."""
-        other = self.threats[0]
-        track = Track(self.path, self.s, self.v, 2.5, -1, 0.0)
-        scene = Scene(self.roads.paths, track, self.threats, EGO, self.assumed, DT)
+        self.decide(nominal, overrides)
+        self.move(self.report.acceleration if overrides else nominal, a_other)
+
+    def decide(self, nominal: float, overrides: bool = True) -> None:
+        """What the shield lets through, in `report`."""
         sample = np.zeros(1, SAMPLE)
-        sample["speed"] = other["v"]
+        sample["speed"] = self.threats["v"]
         self.report = junction_frame(
-            scene, sample, self.memory, self.plan[0], nominal, self.entry, True, TABLE_ONLY, overrides
+            self.scene(),
+            sample,
+            self.memory,
+            self.plan[0],
+            nominal,
+            self.entry,
+            True,
+            TABLE_ONLY,
+            overrides,
+            self.rate,
         )
+
+    def move(self, a_ego: float, a_other: float) -> None:
+        """Both go on for one frame."""
+        other = self.threats[0]
         a = min(max(a_other, -TABLE.other.a_max_brake), TABLE.other.a_max_accel)
         a = min(max(a, -other["v"] / DT), max((self.roads.limit - other["v"]) / DT, 0.0))
         other["s"] += other["v"] * DT
         other["v"] = max(other["v"] + a * DT, 0.0)
         self.s += self.v * DT
-        self.v = max(self.v + (self.report.acceleration if overrides else nominal) * DT, 0.0)
+        self.v = max(self.v + a_ego * DT, 0.0)
 
     def touch(self) -> bool:
         """Is each in the way of the other now?"""

@@ -126,6 +126,7 @@ def start_watch(episode, distances, plans, ride, watch):
     start_ride(ride)
     episode.room_left = episode.room_right = np.inf
     episode.path, episode.go, episode.frames_trapped = -1, -1, 0
+    episode.held_at = np.inf
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     episode.frames = episode.frames_overridden = episode.frames_anticipated = episode.frames_limited = 0
@@ -258,6 +259,7 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
         not settings.waits_anywhere,
         settings.examine,
         settings.overrides,
+        settings.rules.anticipation,
     )
     if settings.overrides:
         if report.overridden and step.partner < 0:
@@ -265,7 +267,7 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
             step.partner = car_of(held, episode) if held >= 0 else -1
         _count_change(episode, step, abs(report.acceleration - car.acceleration), 0.0)
         car.acceleration = report.acceleration
-    _count(episode, step, report, report, False, report.pairs, report.broken, settings.overrides)
+    _count(episode, step, report, report, report.anticipated, report.pairs, report.broken, settings.overrides)
     episode.frames_trapped += report.trapped
     episode.pairs_examined += report.examined
     episode.pairs_possible += report.possible

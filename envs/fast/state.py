@@ -67,6 +67,7 @@ EPISODE = np.dtype(
         ("frame_lane", "i8"),  # lane it measures along, -1 = none yet
         ("path", "i8"),  # through the junction, -1 = none yet
         ("go", "i8"),  # frames of throttle left in its plan through a junction, -1 = no plan
+        ("held_at", "f8"),  # acceleration to which it was held back on the last frame, inf = it was not [m/s^2]
         ("refused", "?"),  # the lane change of this decision was taken back
         ("frames_trapped", "i8"),  # on which no plan stayed clear of everybody
         ("pairs_examined", "i8"),  # pair-frames on which plans were checked against somebody

@@ -40,7 +40,7 @@ class JunctionEgo(ShieldedEgo):
         self.samples = np.zeros(0, SAMPLE)
         self.cars = np.zeros(0, CAR_ON_ROAD)  # everybody on this sample, the ego last
         self.plan = np.zeros(1, PLAN)[0]
-        self.plan["go"] = -1
+        self.plan["go"], self.plan["held_at"] = -1, np.inf
         self.room = np.zeros(64, THREAT)
         self.size_numbers: list[int] = []  # `[N]` index into the junction's sizes
         self.box = np.zeros(6)
@@ -75,7 +75,9 @@ class JunctionEgo(ShieldedEgo):
         self.frames_trapped += report.trapped
         self.pairs_examined += report.examined
         self.pairs_possible += report.possible
-        self._count(report, report, False, report.pairs, report.broken, granted - acceleration, steered - steering)
+        self._count(
+            report, report, report.anticipated, report.pairs, report.broken, granted - acceleration, steered - steering
+        )
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.dt)
         if self.record is not None:
             command = Command(granted, float(np.arctan(0.5 * np.tan(steered))))
@@ -114,6 +116,7 @@ class JunctionEgo(ShieldedEgo):
             not settings.waits_anywhere,
             settings.examine,
             settings.overrides,
+            settings.rules.anticipation,
             holds,
         )
         return report, steering

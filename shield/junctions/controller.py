@@ -3,7 +3,8 @@
 Whatever the agent wants, it may do as long as a plan remains afterwards that meets nobody. If none
 would remain, the plan that was found before is carried out: it stays clear because everybody keeps to
 the bounds it was made for. That is the proper response of Def. 18: stop where stopping was safe, go on
-where only going on was.
+where only going on was. With anticipation, the ego does so smoothly (`shield.easing`): of what leaves a
+plan to stop, it takes the most instead of the hardest braking, and it eases off before that.
 """
 
 from typing import NamedTuple
@@ -11,10 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rss_shield.shield._numba.compiled import apart, compiled, inner
-from rss_shield.shield.definitions.kinematics import time_to_collision
+from rss_shield.shield.definitions.kinematics import stopping_distance, time_to_collision
 from rss_shield.shield.junctions.conflict_areas import CELL, boxes_overlap, cell_of
+from rss_shield.shield.junctions.easing import RISE, SEARCH, caps
 from rss_shield.shield.junctions.examined import TABLE, count_examined, examine, is_left_out
 from rss_shield.shield.junctions.plans import (
+    ANY_PLACE,
     ANYWHERE,
     EVERYBODY,
     GO,
@@ -30,6 +33,7 @@ from rss_shield.shield.junctions.plans import (
     distance_behind,
     first_met,
     go_plan,
+    go_plan_past,
     look_ahead,
     on_path_of_ego,
     plan_conflict,
@@ -115,7 +119,13 @@ SAMPLE = np.dtype(
 )
 
 # The plan in force.
-PLAN = np.dtype([("go", "i8")], align=True)  # frames of throttle left, -1 = no plan
+PLAN = np.dtype(
+    [
+        ("go", "i8"),  # frames of throttle left, -1 = no plan
+        ("held_at", "f8"),  # acceleration to which the ego was held back on the last frame, inf = it was not [m/s^2]
+    ],
+    align=True,
+)
 
 
 class JunctionReport(NamedTuple):
@@ -123,6 +133,7 @@ class JunctionReport(NamedTuple):
 
     acceleration: float  # what it lets through [m/s^2]
     overridden: bool  # somebody's presence changed it
+    anticipated: bool  # anticipation did, though what was asked for would have left a plan
     limited: bool  # only the limits of acceleration did
     response: int  # RESPONSE_BRAKE or RESPONSE_GO where it was overridden, else 0
     pairs: int  # road users toward whom the ego is not free
@@ -134,19 +145,20 @@ class JunctionReport(NamedTuple):
 
 
 @apart
-def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides, holds=False):
+def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which, overrides, rate, holds=False):
     """Restrict the ego's acceleration to what leaves it a plan, and judge everybody.
 
     Args:
       scene: `Scene`; what its threats say about plans is changed.
       samples: `[N]` SAMPLE of all road users.
       memory: `[N]` CROSSING, changed in place.
-      plan: PLAN, or any record with its field, changed in place.
+      plan: PLAN, or any record with its fields, changed in place.
       nominal: acceleration that the ego's own controller asks for [m/s^2].
       entry: CAUTIOUS, PRIORITY or ASSERTIVE.
       at_line: the ego may rest only where it is in nobody's way, whoever may come.
       which: against whom plans are checked, index into `shield.junctions.examined.EXAMINED`.
       overrides: False = watch only.
+      rate: of anticipation, see `Rules` [1/s]; 0 = none.
       holds: the plan in force is carried out, whatever the controller asks for.
 
     Returns:
@@ -155,24 +167,30 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
     sort_out(scene, memory, entry)
     examine(scene, samples, which, SLACK + scene.drift)
     limited = limit(nominal, scene.track.v, scene.ego, scene.dt)
-    a, clear, trapped = nominal, False, False
+    a, clear, trapped, anticipated = nominal, False, False, False
     if overrides:
-        a, clear, trapped = _choose(scene, plan, limited, at_line, holds)
+        if rate > 0.0 and not holds:
+            a, clear, anticipated = _ease(scene, plan, memory, limited, at_line, rate)
+        if not clear:
+            a, clear, trapped = _choose(scene, plan, limited, at_line, holds or rate > 0.0)
         if trapped:
             a = _least_harm(scene, a, len(samples))
+        plan.held_at = a if a < limited else np.inf
     pairs = broken = 0
     for i in range(len(samples)):
         known = clear and (which <= TABLE or not is_left_out(scene, i))
         dangerous, kept = judge_user(scene, i, samples[i], memory[i], a, known, trapped)
         pairs += dangerous
         broken += not kept
-    changed = overrides and a != limited
+    anticipated = anticipated and a != limited
+    changed = overrides and a != limited and not anticipated
     response = 0
     if changed:
         response = RESPONSE_BRAKE if a < limited else RESPONSE_GO
     return JunctionReport(
         a,
         changed,
+        anticipated,
         limited != nominal and a == limited,
         response,
         pairs,
@@ -301,6 +319,99 @@ def _choose(scene, plan, a, at_line, holds):
         plan.go = max(plan.go - 1, 0)
         return (go_now if goes else brake), True, False
     return _escape(scene, plan, go_now, brake)
+
+
+@inner
+def _ease(scene, plan, memory, wish, at_line, rate):
+    """The smoothest acceleration toward a wish that leaves a plan, see `shield.easing`.
+
+    Returns:
+      (acceleration, does it leave a plan, does the wish as well). Without a plan nothing is decided.
+    """
+    ego, slack = scene.ego, SLACK + scene.drift
+    limits = caps(scene, memory, at_line, rate)
+    rise = max(plan.held_at, -ego.a_min_brake) + RISE * scene.dt
+    if stop_conflict(scene, wish, EVERYBODY, at_line, slack) == NEVER:
+        if wish <= min(limits.behind, limits.line, rise):
+            plan.go = 0
+            return wish, True, True
+        return _ease_off(scene, plan, wish, limits, rise, at_line)
+    go, _ = go_plan(scene, wish, EVERYBODY, at_line, slack)
+    if go >= 0:
+        a, plan.go = _pull_away(scene, wish, go, min(limits.behind, rise), at_line, ANY_PLACE)
+        return a, True, True
+    if plan.go > 0:  # what has begun is gone through with
+        return wish, False, False
+    cap = limit(min(limits.behind, limits.line, rise), scene.track.v, ego, scene.dt)
+    a, stops = _largest_that_stops(scene, wish, cap, at_line)
+    if stops:
+        plan.go = 0
+    return a, stops, False
+
+
+@apart
+def _ease_off(scene, plan, wish, limits, rise, at_line):
+    """`_ease` where a wish leaves a plan to stop, but is more than its caps."""
+    track, dt, slack = scene.track, scene.dt, SLACK + scene.drift
+    rest = track.s + track.v * dt + stopping_distance(track.v + wish * dt, scene.ego.a_min_brake)
+    cap, line = min(limits.behind, rise), limits.line
+    if rest >= limits.place:  # it comes to rest past the line
+        line = np.inf
+    if line < wish:
+        go, _ = go_plan_past(scene, wish, EVERYBODY, at_line, slack, limits.place)
+        if go >= 0:
+            a, plan.go = _pull_away(scene, wish, go, cap, at_line, limits.place)
+            return a, True, True
+        if plan.go > 0 and plan_conflict(scene, plan.go, EVERYBODY, 0.0) == NEVER:
+            go_now = throttle(scene, track.s, track.v)
+            if wish >= go_now:  # what has begun is gone through with
+                plan.go -= 1
+                return go_now, True, True
+    plan.go = 0
+    eased = limit(min(cap, line), track.v, scene.ego, dt)
+    if eased >= wish or stop_conflict(scene, eased, EVERYBODY, at_line, slack) != NEVER:
+        return wish, True, True
+    return eased, True, True
+
+
+@apart
+def _pull_away(scene, wish, go, cap, at_line, place):
+    """Acceleration of a plan to go on, below a cap if that leaves one, and its frames of throttle.
+
+    Args:
+      go: frames of throttle after the wish.
+      place: the plan may not come to rest before it [m].
+    """
+    eased = limit(cap, scene.track.v, scene.ego, scene.dt)
+    if eased < wish:
+        gently, _ = go_plan_past(scene, eased, EVERYBODY, at_line, SLACK + scene.drift, place)
+        if gently > 0:
+            return eased, gently
+    return wish, go
+
+
+@apart
+def _largest_that_stops(scene, wish, cap, at_line):
+    """Largest acceleration, up to a cap below a wish that leaves no plan to stop, that leaves one.
+
+    Returns:
+      (acceleration, is there any), to within 2^-`SEARCH` of what is between braking and the wish.
+    """
+    slack = SLACK + scene.drift
+    low, high = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt), wish
+    if cap < wish:
+        if stop_conflict(scene, cap, EVERYBODY, at_line, slack) == NEVER:
+            return cap, True
+        high = cap
+    if high < low or stop_conflict(scene, low, EVERYBODY, at_line, slack) != NEVER:
+        return low, False
+    for _ in range(SEARCH):
+        middle = 0.5 * (low + high)
+        if stop_conflict(scene, middle, EVERYBODY, at_line, slack) == NEVER:
+            low = middle
+        else:
+            high = middle
+    return low, True
 
 
 @apart

@@ -39,6 +39,7 @@ NEVER = 1 << 30  # frame of something that does not happen
 EVERYBODY = np.int64(-1)  # whom a plan stays clear of
 ANYWHERE = np.bool_(False)  # it may come to rest wherever nobody meets it, not only `at_line`
 NOW, NEXT = np.int64(0), np.int64(1)  # frames of a plan
+ANY_PLACE = -np.inf  # a plan may come to rest before it
 
 # Rule J9. Who has stood for `PATIENCE` has to notice first that somebody counts on that: it stands for `START_UP` more.
 PATIENCE = (15.0, 5.0, 5.0)  # by `entry`: cautious, priority, assertive [s]
@@ -51,7 +52,7 @@ _SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
 _REVERSE = 1.0  # a car that reverses may go on for this long [s]
 _TAIL = 3  # frames between two moments at which a go plan may begin to brake
 _LONGEST = 10.0  # throttle phase of a plan, at most [s]
-_BETWEEN = 3.0  # cars that follow each other are in each other's way with so much between them, margins included [m]
+BETWEEN = 3.0  # cars that follow each other are in each other's way with so much between them, margins included [m]
 _REST = 1e-9  # below this speed a plan has come to rest [m/s]
 _STRIDE = 8  # frames of a plan that are looked at together
 _FEW = 250.0  # frames, in which rounding ...
@@ -219,7 +220,7 @@ def on_path_of_ego(paths, track, s, threat, s_threat):
 def _comes_from_behind(paths, track, s, threat, s_threat, distance):
     """Does a road user at `distance` [m] behind the ego not come in its way before? On a ring everybody is behind."""
     first = paths.first[track.path, threat.path, cell_of(s, paths.cells[track.path])]
-    return first - s_threat >= distance - (track.half_length + threat.half_length + _BETWEEN)
+    return first - s_threat >= distance - (track.half_length + threat.half_length + BETWEEN)
 
 
 @inner
@@ -550,13 +551,19 @@ def go_plan(scene, a, only, at_line, slack):
       (frames of throttle, frame of the first conflict): frames = -1 if there is no such plan; then the
       latest first conflict of all, as `tail_conflict` says it.
     """
+    return go_plan_past(scene, a, only, at_line, slack, ANY_PLACE)
+
+
+@compiled
+def go_plan_past(scene, a, only, at_line, slack, place):
+    """`go_plan`, but none that comes to rest before a `place` [m]."""
     begin(scene)
     s, v = step(scene.track.s, scene.track.v, a, scene.dt)
     n, latest = NEXT, NOW
     while n * scene.dt < _LONGEST:
         if _meets_anyone(scene, s, v, n, only, slack):
             return -1, max(latest, n)
-        if n % _TAIL == 2:
+        if n % _TAIL == 2 and s + stopping_distance(v, scene.ego.a_min_brake) >= place:
             conflict = tail_conflict(scene, s, v, n, scene.ego.a_min_brake, only, at_line, slack)
             if conflict == NEVER:
                 return n - 1, NEVER
