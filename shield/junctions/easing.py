@@ -16,13 +16,14 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.junctions.conflict_areas import CELL, cell_of
-from rss_shield.shield.junctions.plans import BETWEEN, behind_by
+from rss_shield.shield.junctions.plans import behind_by
 
 SETTLE = 0.08  # at speed v it is over this much times v later, so that its end is soft [s]
 EAGER = 5.0  # margins shrink at this many times the rate of anticipation: nobody but the ego changes them much
 RISE = 60.0  # by so much the acceleration grows at most after the ego was held back [m/s^3]
 SEARCH = 5  # halvings of what is open
 ROOM = 0.05  # between where the ego comes to rest and where it may not [m]
+BETWEEN = 1.0  # and the bumper of who drives ahead: about as near as plans let it come [m]
 
 
 class Caps(NamedTuple):

@@ -52,7 +52,7 @@ _SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
 _REVERSE = 1.0  # a car that reverses may go on for this long [s]
 _TAIL = 3  # frames between two moments at which a go plan may begin to brake
 _LONGEST = 10.0  # throttle phase of a plan, at most [s]
-BETWEEN = 3.0  # cars that follow each other are in each other's way with so much between them, margins included [m]
+_BETWEEN = 3.0  # cars that follow each other are in each other's way with so much between them, margins included [m]
 _REST = 1e-9  # below this speed a plan has come to rest [m/s]
 _STRIDE = 8  # frames of a plan that are looked at together
 _FEW = 250.0  # frames, in which rounding ...
@@ -220,7 +220,7 @@ def on_path_of_ego(paths, track, s, threat, s_threat):
 def _comes_from_behind(paths, track, s, threat, s_threat, distance):
     """Does a road user at `distance` [m] behind the ego not come in its way before? On a ring everybody is behind."""
     first = paths.first[track.path, threat.path, cell_of(s, paths.cells[track.path])]
-    return first - s_threat >= distance - (track.half_length + threat.half_length + BETWEEN)
+    return first - s_threat >= distance - (track.half_length + threat.half_length + _BETWEEN)
 
 
 @inner
