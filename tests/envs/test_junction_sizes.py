@@ -37,9 +37,9 @@ class Motorcycle(IDMVehicle):
     LENGTH, WIDTH = 2.2, 0.8
 
 
-def meet(env_id, kind, lane, s, speed, decisions=12, seed=0, route="o1", intent="any"):
+def meet(env_id, kind, lane, s, speed, decisions=12, seed=0, route="o1", **options):
     """Play full throttle with one other road user on the road; returns the last info, and the two."""
-    env = make(env_id, config={"duration": decisions}, intent=intent)
+    env = make(env_id, config={"duration": decisions}, **options)
     env.reset(seed=seed)
     base = env.unwrapped
     base.config["spawn_probability"] = 0
@@ -107,13 +107,15 @@ def test_nor_before_whoever_may_swing_wide_where_it_stops_early(s, speed, route)
     assert info["episode_broken_duties"] == 0
 
 
-def test_behind_a_truck_the_ego_stops_as_far_from_its_rear_as_from_that_of_a_car():
+def test_behind_a_truck_the_ego_stops_behind_its_rear():
+    """Where it cannot be sure that a long one needs no room behind as it turns, it goes no nearer than it has to."""
+
     def gap(kind, ahead):
         _, ego, other = meet("roundabout-v0", kind, None, ahead, 0.0, route="nxs")
         return np.hypot(*(other.position - ego.position)) - 2.5 - 0.5 * kind.LENGTH
 
-    for kind in (Truck, Bus, Motorcycle):
-        assert 0.2 < gap(kind, 13.0 + 0.5 * kind.LENGTH) < gap(IDMVehicle, 15.5) + 1.0
+    for kind in (Truck, Bus, Motorcycle, IDMVehicle):
+        assert 0.2 < gap(kind, 13.0 + 0.5 * kind.LENGTH) < 4.0
 
 
 def test_sizes_are_rounded_up_and_those_on_the_grid_are_exact():
