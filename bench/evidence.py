@@ -32,6 +32,7 @@ import rss_shield.envs.worlds.random_roads
 from rss_shield import make, make_vec
 from rss_shield.envs.highway.drivers import RECKLESS
 from rss_shield.eval.files import atomic
+from rss_shield.eval.metrics import AT_FAULT, BLAMES
 from rss_shield.eval.pages import fill, markdown, spaced, write_page
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.rollout import evaluate, run_episode
@@ -213,9 +214,7 @@ def in_engine(name: str, mode: str, count: int, config: Config) -> pd.DataFrame:
 def row(frame: pd.DataFrame) -> list[str]:
     """One line of the table."""
     n = len(frame)
-    count = {
-        verdict: int((frame["blame"] == verdict).sum()) for verdict in ("ego", "both", "other", "inherited", "none")
-    }
+    count = {verdict: int((frame["blame"] == verdict).sum()) for verdict in BLAMES}
     at_fault = count["ego"] + count["both"]
     returns = bootstrap_mean(frame["return"], np.random.default_rng(0))
     return [
@@ -363,7 +362,7 @@ def percent(share: float) -> str:
 
 def faults(frame: pd.DataFrame) -> int:
     """Episodes that ended in a contact by the ego's fault."""
-    return int(frame["blame"].isin(["ego", "both"]).sum())
+    return int(frame["blame"].isin(AT_FAULT).sum())
 
 
 def commands(played: list[Played]) -> str:
@@ -442,7 +441,7 @@ def main(config: Config) -> int:
             table.add_row(*row(frame))
             bad += int((frame["blame"] == "none").sum())
             if mode == "override":
-                bad += int(frame["blame"].isin(["ego", "both"]).sum() + (frame["broken_duties"] > 0).sum())
+                bad += int(frame["blame"].isin(AT_FAULT).sum() + (frame["broken_duties"] > 0).sum())
     if cases:
         Console(width=170).print(table)
         print("at fault: upper end of the 95 % Wilson interval; return: mean with 95 % bootstrap interval")

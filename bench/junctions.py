@@ -33,6 +33,7 @@ from rich.table import Table
 from rss_shield import make_vec
 from rss_shield.envs.roads.network import local_coordinates
 from rss_shield.eval.files import atomic
+from rss_shield.eval.metrics import AT_FAULT, BLAMES
 from rss_shield.eval.pages import markdown, write_page
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.rollout import evaluate
@@ -46,7 +47,6 @@ FASTER, ACTIONS = 2, 3  # SLOWER, IDLE, FASTER
 STANDING = 0.5  # slower than this a car stands [m/s]
 SIDE_BY_SIDE = 256  # environments in the engine
 POLICIES, TABLES = ("faster", "random"), ("progress", "intent", "examined")
-VERDICTS = ("ego", "both", "other", "inherited", "none")
 
 
 class Case(NamedTuple):
@@ -177,7 +177,7 @@ def is_in_way(engine: Any, e: int) -> bool:
 
 def contacts(frame: pd.DataFrame) -> list[str]:
     """Contacts, how many by each verdict, and what the others and the ego broke in them."""
-    by_verdict = [int((frame["blame"] == verdict).sum()) for verdict in VERDICTS]
+    by_verdict = [int((frame["blame"] == verdict).sum()) for verdict in BLAMES]
     evidence = [grounds for grounds in map(json.loads, frame["evidence"]) if grounds]
     broken = [counted([grounds[duty] for grounds in evidence]) for duty in ("other_duty", "ego_duty")]
     return [str(int(frame["crashed"].sum())), "/".join(map(str, by_verdict)), *broken]
@@ -189,7 +189,7 @@ def counted(duties: list[str]) -> str:
 
 
 def at_fault(frame: pd.DataFrame) -> str:
-    k = int(frame["blame"].isin(["ego", "both"]).sum())
+    k = int(frame["blame"].isin(AT_FAULT).sum())
     return f"{k} (< {100 * wilson(k, len(frame)).high:.2g} %)"
 
 

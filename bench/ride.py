@@ -32,6 +32,7 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.stock import make_stock
 from rss_shield.eval.files import write_text
+from rss_shield.eval.metrics import AT_FAULT
 from rss_shield.eval.rollout import evaluate, run_episode
 from rss_shield.eval.stats import paired_difference
 from rss_shield.shield.definitions.kinematics import frames_for
@@ -173,7 +174,7 @@ def row(driver: str, shield: str, frame: pd.DataFrame) -> Row:
     def share(name: str) -> float:
         return float((frame[name] * weight).sum())
 
-    at_fault, none = frame["blame"].isin(["ego", "both"]).sum(), (frame["blame"] == "none").sum()
+    at_fault, none = frame["blame"].isin(AT_FAULT).sum(), (frame["blame"] == "none").sum()
     return Row(
         driver,
         shield,

@@ -13,6 +13,7 @@ import pandas as pd
 from rss_shield.eval.stats import Interval, bootstrap_mean, bootstrap_median, paired_difference, student, wilson
 
 BLAMES = ("ego", "both", "other", "inherited", "none")
+AT_FAULT = ("ego", "both")
 
 
 class Metric(NamedTuple):
@@ -58,13 +59,13 @@ def with_outcomes(episodes: pd.DataFrame) -> pd.DataFrame:
     if "success" in episodes:
         episodes = episodes.assign(time_to_goal=episodes["time"].where(episodes["success"].astype(bool)))
     blame, crash = episodes["blame"], episodes["crashed"].astype(bool)
-    at_fault = blame.isin(["ego", "both"])
+    at_fault = blame.isin(AT_FAULT)
     return episodes.assign(
         crash=crash,
         at_fault=at_fault,
         other=blame == "other",
         inherited=blame == "inherited",
-        none=crash & ~blame.isin(["ego", "both", "other", "inherited"]),
+        none=crash & ~blame.isin(BLAMES[:-1]),
     )
 
 

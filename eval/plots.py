@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from rss_shield.eval.files import atomic
-from rss_shield.eval.metrics import BLAMES
+from rss_shield.eval.metrics import AT_FAULT, BLAMES
 from rss_shield.eval.stats import Interval, completion_weights, weighted_mean, weighted_rate, wilson
 
 # Okabe & Ito's colours, told apart with every common colour blindness
@@ -49,7 +49,7 @@ def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
         started, cut, length, return, crashed, blame, override_share.
       folder: gets learning_curve.png and learning_curve.pdf.
     """
-    at_fault = curve["blame"].isin(["ego", "both"])
+    at_fault = curve["blame"].isin(AT_FAULT)
     panels = (
         ("Return per episode", curve["return"], weighted_mean),
         ("Episodes with a crash", curve["crashed"], weighted_rate),
@@ -112,7 +112,7 @@ def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
             )
             tops += heights
         for i, (_, cell) in enumerate(cells):
-            at_fault = cell["blame"].isin(["ego", "both"])
+            at_fault = cell["blame"].isin(AT_FAULT)
             _whisker(axes, i - 0.12, wilson(int(at_fault.sum()), len(cell)))
             _whisker(axes, i + 0.12, wilson(int(cell["crashed"].sum()), len(cell)))
         axes.set_xticks(

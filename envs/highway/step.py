@@ -12,7 +12,7 @@ from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.options import LANES, Options, Settings
 from rss_shield.shield.comfort import comfort_of
 from rss_shield.shield.lanes.controller import response_name
-from rss_shield.shield.lanes.judge import Audit, audit
+from rss_shield.shield.lanes.judge import AT_FAULT, Audit, audit
 
 LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
 
@@ -66,7 +66,7 @@ def end_step(ego: ShieldedEgo, had_contact: bool, action: Any) -> dict[str, Any]
     """Judge what happened since `begin_step`; returns the info of this step."""
     ego.check_contact()
     judge = ego.judge
-    at_fault = not had_contact and judge.contact is not None and judge.contact["verdict"] in ("ego", "both")
+    at_fault = not had_contact and judge.contact is not None and judge.contact["verdict"] in AT_FAULT
     cost = 1.0 if judge.tally.broken_duties or at_fault else 0.0
     ego.cost += cost
     info = info_of(ego, cost)

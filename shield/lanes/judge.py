@@ -59,6 +59,7 @@ DUTIES = (
 )
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")
+AT_FAULT = ("ego", "both")  # verdicts that charge the ego
 
 _NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
