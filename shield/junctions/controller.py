@@ -323,7 +323,7 @@ def _choose(scene, plan, a, at_line, holds):
 
 @inner
 def _ease(scene, plan, memory, wish, at_line, rate):
-    """The smoothest acceleration toward a wish that leaves a plan, see `shield.easing`.
+    """The smoothest acceleration toward a wish that leaves a plan, see `shield.junctions.easing`.
 
     Returns:
       (acceleration, does it leave a plan, does the wish as well). Without a plan nothing is decided.
