@@ -3,7 +3,7 @@
 Whatever the agent wants, it may do as long as a plan remains afterwards that meets nobody. If none
 would remain, the plan that was found before is carried out: it stays clear because everybody keeps to
 the bounds it was made for. That is the proper response of Def. 18: stop where stopping was safe, go on
-where only going on was. With anticipation, the ego does so smoothly (`shield.easing`): of what leaves a
+where only going on was. With anticipation, the ego does so smoothly (`shield.junctions.easing`): of what leaves a
 plan to stop, it takes the most instead of the hardest braking, and it eases off before that.
 """
 
