@@ -233,7 +233,7 @@ def test_every_cell_of_a_run_plays_the_same_seeds(finished):
     assert list(seeds.values()) == [[10**9, 10**9 + 1, 10**9 + 2]] * 4
     assert (episodes.loc[episodes["test"] == "off", "override_share"] == 0).all()
     cells = json.loads((folder / "results.json").read_text())["cells"]
-    assert len(cells) == 4 * len(METRICS)
+    assert len(cells) == 4 * (len(METRICS) - 2)  # here nothing can succeed, sooner or later
     assert all(cell["n"] == 3 for cell in cells)
 
 

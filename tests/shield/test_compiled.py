@@ -1,8 +1,10 @@
 """How functions are compiled."""
 
 import os
+import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -72,9 +74,46 @@ def test_every_function_says_whether_it_is_merged_into_its_callers():
 
 
 def test_a_change_in_any_file_that_the_kernel_is_made_of_compiles_it_anew():
-    files = {Path(function.py_func.__code__.co_filename) for function in _parts(run, set())}
+    files = {Path(function.py_func.__code__.co_filename).resolve() for function in _parts(run, set())}
     assert {file.name for file in files} >= {"engine.py", "guard.py", "ways.py", "plans.py"}
     assert files <= {*sources(), *Path(rss_shield.shield.__file__).resolve().parent.rglob("*.py")}
+
+
+STAMPS = """
+from rss_shield.envs.compiled import sources
+from rss_shield.envs.roads.network import position
+from rss_shield.shield._numba.compiled import fingerprint
+from rss_shield.shield.junctions.plans import throttle
+from rss_shield.shield.lanes.pair import assess
+parts = (function._cache._cache_file._source_stamp for function in (assess, throttle, position))
+print(fingerprint(*sources()), *parts)
+"""
+
+
+def test_an_edit_at_any_depth_is_noticed(tmp_path):
+    """Once in the checkout, whose package holds links, and once installed, where it holds the folders."""
+    for name, linked in (("checkout", True), ("installed", False)):
+        copy = tmp_path / name
+        ignored = shutil.ignore_patterns("__pycache__", "train.py")
+        for folder in ("shield", "envs", "rss_shield"):
+            if linked or folder == "rss_shield":
+                shutil.copytree(ROOT / folder, copy / folder, symlinks=linked, ignore=ignored)
+        assert (copy / "rss_shield" / "shield").is_symlink() == linked
+        stamps = [_stamps(copy)]
+        for edited in ("shield/definitions/kinematics.py", "shield/junctions/plans.py", "shield/_numba/indices.py"):
+            with open(copy / "rss_shield" / edited, "a") as file:
+                file.write("# edited\n")
+            stamps.append(_stamps(copy))
+        for before, after in pairwise(stamps):
+            assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+def _stamps(folder):
+    environment = os.environ | {"PYTHONPATH": str(folder)}
+    done = subprocess.run(
+        [sys.executable, "-c", STAMPS], env=environment, cwd=folder, capture_output=True, text=True, check=True
+    )
+    return done.stdout.split()
 
 
 class _Vanished:
@@ -129,12 +168,12 @@ import numba.core.typed_passes as passes
 del passes.{gone}  # as if numba had another name for it; numba itself has its own reference
 with warnings.catch_warnings(record=True) as said:
     warnings.simplefilter("always")
-    import rss_shield.shield, shield.controller, shield.plans
+    import rss_shield, rss_shield.shield.lanes.controller, rss_shield.shield.junctions.plans
 for warning in said:
     print(warning.message)
 table = rss_shield.PRESETS["simulator"]
-print(shield.d_min_same_direction(20.0, 15.0, table.ego, table.other))
-print(shield.d_min_lateral(1.0, -0.5, table.ego, table.other))
+print(rss_shield.d_min_same_direction(20.0, 15.0, table.ego, table.other))
+print(rss_shield.d_min_lateral(1.0, -0.5, table.ego, table.other))
 """
 
 

@@ -134,9 +134,9 @@ import sys
 import numpy as np
 import {packages}
 sys.path.append({project!r})
-import rss_shield.shield
-table = shield.PRESETS["slides"]
-assert shield.d_min_same_direction(20.0, 20.0, table.ego, table.other) > 0.0
+import rss_shield
+table = rss_shield.PRESETS["slides"]
+assert rss_shield.d_min_same_direction(20.0, 20.0, table.ego, table.other) > 0.0
 for package in ({packages},):
     print(*package.ends(np.arange(5.0), np.arange(6.0).reshape(2, 3)))
 """
