@@ -14,10 +14,10 @@ PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help compare $(ENVS:%=compare-%) test bench evidence docs check clean
+.PHONY: help compare $(ENVS:%=compare-%) test test-fast bench evidence docs check clean
 
 help:            ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
 	@echo
 	@echo "  PYTHON=$(PYTHON) makes the environment; ARGS='--total-timesteps 1000000' goes to train.py;"
 	@echo "  ENVS='highway-fast-v0 intersection-v0' are the environments of compare."
@@ -30,6 +30,9 @@ $(ENVS:%=compare-%): compare-%: $(VENV)/installed
 
 test: $(VENV)/installed-dev  ## run every test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+test-fast: $(VENV)/installed-dev  ## run the tests of single functions and small scenes (a minute)
+	$(BIN)/python -m pytest $(PYTEST_ARGS) -m "not slow"
 
 bench: $(VENV)/installed-dev  ## run the benchmarks
 	$(BIN)/python -m pytest bench --benchmark-only -q -s

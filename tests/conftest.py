@@ -5,8 +5,71 @@ And an intersection, which changes the class of all traffic in the process, chan
 
 import numpy as np
 import pytest
+from places import ROOT
 
 from rss_shield.envs.stock import drivers_unchanged
+
+# whole episodes, many of them, or new processes: left out by `make test-fast`
+SLOW = frozenset(
+    [
+        "agents/test_ppo",
+        "envs/test_arguments",
+        "envs/test_backing_up",
+        "envs/test_bends",
+        "envs/test_compliant_traffic",
+        "envs/test_egos",
+        "envs/test_free_steering",
+        "envs/test_hostile",
+        "envs/test_judge",
+        "envs/test_junction_roads",
+        "envs/test_junction_sizes",
+        "envs/test_lane_changes",
+        "envs/test_multi_agent",
+        "envs/test_parallel_env",
+        "envs/test_random_roads",
+        "envs/test_roads",
+        "envs/test_several_contacts",
+        "envs/test_shielded_traffic",
+        "envs/test_signalised",
+        "envs/test_standing",
+        "envs/test_stock",
+        "envs/test_taken_back",
+        "envs/test_wrapper",
+        "eval/test_learning_curve",
+        "eval/test_replay",
+        "eval/test_rollout",
+        "fast/test_adapter",
+        "fast/test_floats",
+        "fast/test_intersection",
+        "fast/test_neighbours",
+        "fast/test_parity",
+        "fast/test_recording",
+        "fast/test_ufuncs",
+        "fast/test_vector",
+        "shield/test_adrss_oracle",
+        "shield/test_anticipation",
+        "shield/test_anything",
+        "shield/test_blame",
+        "shield/test_compiled",
+        "shield/test_def12_def13_evasion",
+        "shield/test_def22_open_space",
+        "shield/test_easing",
+        "shield/test_examined",
+        "shield/test_far_pairs",
+        "shield/test_held_back",
+        "shield/test_indices",
+        "shield/test_junction_blame",
+        "shield/test_mutations",
+        "shield/test_plans",
+        "shield/test_present_duties",
+        "shield/test_theorems",
+        "shield/test_comfort",
+        "shield/test_def18_junction_response",
+        "test_install",
+        "test_pages",
+        "test_train_cli",
+    ]
+)
 
 np.seterr(divide="raise", over="raise", invalid="raise")
 
@@ -21,3 +84,9 @@ def _modules_leave_drivers_unchanged():
 def _tests_leave_drivers_unchanged():
     with drivers_unchanged():
         yield
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.path.relative_to(ROOT / "tests").with_suffix("").as_posix() in SLOW:
+            item.add_marker(pytest.mark.slow)
