@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rss_shield.eval.stats import bootstrap_mean, bootstrap_median, clopper_pearson, paired_difference, wilson
+from rss_shield.eval.stats import MANY, bootstrap_mean, bootstrap_median, clopper_pearson, paired_difference, wilson
 
 # Newcombe (1998), Statistics in Medicine 17:857-872, Table I, method 3 (Wilson, uncorrected).
 NEWCOMBE = [
@@ -147,3 +147,14 @@ def test_pairing_removes_what_both_samples_share():
 def test_paired_samples_must_have_one_length():
     with pytest.raises(ValueError, match="differ in length: 2 and 3"):
         paired_difference([1, 2], [1, 2, 3], np.random.default_rng(0))
+
+
+def test_the_interval_of_very_many_values_is_the_bootstraps():
+    values = np.random.default_rng(0).exponential(3.0, MANY + 1)
+    many = bootstrap_mean(values, np.random.default_rng(1))
+    fewer = bootstrap_mean(values[:-1], np.random.default_rng(1))
+    assert many.value == values.mean()
+    assert many.n == MANY + 1
+    width = fewer.high - fewer.low
+    assert abs(many.low - fewer.low) < 0.1 * width
+    assert abs(many.high - fewer.high) < 0.1 * width
