@@ -126,7 +126,7 @@ def start_watch(episode, distances, plans, ride, watch):
     start_ride(ride)
     episode.room_left = episode.room_right = np.inf
     episode.path, episode.go, episode.frames_trapped = -1, -1, 0
-    episode.held_at = np.inf
+    episode.held_at, episode.wronged = np.inf, False
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     episode.frames = episode.frames_overridden = episode.frames_anticipated = episode.frames_limited = 0

@@ -68,6 +68,7 @@ EPISODE = np.dtype(
         ("path", "i8"),  # through the junction, -1 = none yet
         ("go", "i8"),  # frames of throttle left in its plan through a junction, -1 = no plan
         ("held_at", "f8"),  # acceleration to which it was held back on the last frame, inf = it was not [m/s^2]
+        ("wronged", "?"),  # somebody broke a duty, and it has had no plan since that stays clear of everybody
         ("refused", "?"),  # the lane change of this decision was taken back
         ("frames_trapped", "i8"),  # on which no plan stayed clear of everybody
         ("pairs_examined", "i8"),  # pair-frames on which plans were checked against somebody

@@ -58,6 +58,7 @@ from rss_shield.shield.lanes.judge import (
     REVERSED,
     TOO_FAR,
     TOO_HARD,
+    TRAPPED,
     WAVERED,
     Verdict,
 )
@@ -95,6 +96,7 @@ CROSSING = np.dtype(
         ("ego_excess", "f8"),
         ("other_broke", "i8"),
         ("other_excess", "f8"),
+        ("was_lawless", "?"),  # the other broke one up to this sample, though the ego may have a plan toward it again
     ],
     align=True,
 )
@@ -123,6 +125,7 @@ PLAN = np.dtype(
     [
         ("go", "i8"),  # frames of throttle left, -1 = no plan
         ("held_at", "f8"),  # acceleration to which the ego was held back on the last frame, inf = it was not [m/s^2]
+        ("wronged", "?"),  # somebody broke a duty, and there has been no plan since that stays clear of everybody
     ],
     align=True,
 )
@@ -182,6 +185,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         dangerous, kept = judge_user(scene, i, samples[i], memory[i], a, known, trapped)
         pairs += dangerous
         broken += not kept
+    _note_who_trapped(plan, memory, trapped)
     anticipated = anticipated and a != limited
     changed = overrides and a != limited and not anticipated
     response = 0
@@ -200,6 +204,22 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         count_examined(scene),
         len(samples),
     )
+
+
+@inner
+def _note_who_trapped(plan, memory, trapped):
+    """Whoever broke a duty and so trapped the ego is to blame for contacts with those toward whom no plan is left.
+
+    They may have done nothing wrong, and the ego had to break its plans toward somebody (hole H24).
+    """
+    if not trapped:
+        plan.wronged = False
+        return
+    for i in range(len(memory)):
+        plan.wronged |= memory[i].was_lawless
+    for i in range(len(memory)):
+        if plan.wronged and memory[i].since == 1 and memory[i].other_broke == KEPT:
+            memory[i].other_broke = TRAPPED
 
 
 @apart
@@ -517,6 +537,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
       judged more strictly: whoever left itself no plan toward the other is to blame, trapped or not.
     """
     _judge_motion(sample, memory, scene.other, scene.dt)
+    memory.was_lawless = memory.other_broke != KEPT
     scene = _alone_with(scene, i)
     memory.stood = memory.stood + 1 if abs(sample.speed) < STANDING and not sample.alert else 0
     memory.counted_on = memory.counted_on + 1 if _counts_on_standing(scene, i, a) else 0
@@ -584,7 +605,7 @@ def _judge_motion(sample, memory, other, dt):
     moved = np.hypot(sample.x - memory.x, sample.y - memory.y)
     if sample.wreck and (not memory.wreck or moved > _JITTER * dt):
         duty = CRASHED
-    elif (sample.astray and not memory.astray) or sample.strays or sample.lanes & ~memory.lanes != 0:
+    elif _leaves_paths(sample, memory):
         duty = LEFT_PATHS
     elif faster > _JITTER and not sample.wreck:
         duty, excess = ACCELERATED, faster / dt
@@ -596,6 +617,13 @@ def _judge_motion(sample, memory, other, dt):
         duty = GAVE_NO_WAY  # forgotten by `judge_user` if the ego still has a plan
     if duty != KEPT and memory.other_broke == KEPT:
         memory.other_broke, memory.other_excess = duty, excess
+
+
+@inner
+def _leaves_paths(sample, memory):
+    """Has a road user gone where none of its ways leads? Who is off all of them has to come to rest, or come back."""
+    off = sample.astray and (not memory.astray or abs(sample.speed) > abs(memory.speed) + _JITTER)
+    return off or sample.strays or sample.lanes & ~memory.lanes != 0
 
 
 @apart

@@ -36,9 +36,8 @@ from rss_shield.shield.lanes.memory import (
 from rss_shield.shield.lanes.pair import assess, head_on_braking, is_following, sampled_approach
 
 KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
-LEFT_NO_PLAN, WAVERED, ACCELERATED, BRAKED, LEFT_PATHS, CRASHED, GAVE_NO_WAY, REVERSED, CUT_IN = range(
-    7, 16
-)  # at junctions
+# at junctions; who is TRAPPED has no plan left toward anybody because a third broke its duty
+LEFT_NO_PLAN, WAVERED, ACCELERATED, BRAKED, LEFT_PATHS, CRASHED, GAVE_NO_WAY, REVERSED, CUT_IN, TRAPPED = range(7, 17)
 DUTIES = (
     "",
     "got farther along the lane than its share [m]",
@@ -56,6 +55,7 @@ DUTIES = (
     "did not give way",
     "reversed [m/s]",
     "cut in in front of the other",
+    "none: somebody else had trapped the ego",
 )
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")
