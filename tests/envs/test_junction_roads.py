@@ -158,7 +158,7 @@ def test_an_ego_that_waits_to_enter_a_ring_is_not_trapped_by_a_second_lap(seed):
 @pytest.mark.parametrize(
     ("env_id", "seed", "actions", "duty"),
     [
-        # a car changed lanes on the ring and so trapped the ego, which another one hit later that had done nothing wrong
+        # a car changed lanes and so trapped the ego, which another one hit later that had done nothing wrong
         ("roundabout-v0", 9791, "02412401321", "none: somebody else had trapped the ego"),
         # a car that stood off every path set off again
         ("intersection-v2", 11830, "0200201120100", "left every path it could take"),
