@@ -60,7 +60,7 @@ def bootstrap_mean(sample: ArrayLike, rng: np.random.Generator, confidence: floa
     has seen.
     """
     values = np.asarray(sample, float)
-    if values.size > MANY:
+    if values.size > MANY and np.ptp(values) > 0.0:
         low, high = stats.norm.interval(confidence, values.mean(), stats.sem(values))
         return Interval(float(values.mean()), float(low), float(high), values.size)
     return _bootstrap(values, np.mean, "BCa", rng, confidence)
