@@ -266,7 +266,8 @@ Written by `python bench/evidence.py --write` from what its other calls have pla
 Scripted policies, seeds 0, 1, ... *Contacts* are those of the ego, with whose doing they were. *None* counts contacts
 that nobody's duty explains, which would be a bug. *Pair-frames* are all frames on which some car and the ego were in
 danger; *broken* counts those on which the ego's command broke its duty. In brackets: the upper end of the 95 % Wilson
-interval; for the return the 95 % bootstrap interval of the mean."""
+interval; for the return the 95 % interval of the mean: the bootstrap's, for more than 5000 episodes that of the central
+limit theorem."""
 HEADINGS = (
     *("case", "episodes", "contacts", "ego at fault (95 % below)", "none", "broken / pair-frames"),
     *("frames overridden", "return"),
@@ -444,7 +445,7 @@ def main(config: Config) -> int:
                 bad += int(frame["blame"].isin(AT_FAULT).sum() + (frame["broken_duties"] > 0).sum())
     if cases:
         Console(width=170).print(table)
-        print("at fault: upper end of the 95 % Wilson interval; return: mean with 95 % bootstrap interval")
+        print("at fault: upper end of the 95 % Wilson interval; return: mean with its 95 % interval")
     if config.write:
         write(config.out)
         print(f"written: {PAGE}, {README}")
