@@ -12,7 +12,19 @@ LIBRARIES = {
     "shield": {"numpy", "numba"},
     "envs": {"gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo"},
     "agents": {"gymnasium", "stable_baselines3", "torch", "numpy"},
-    "eval": {"numpy", "scipy", "pandas", "matplotlib", "rich", "tqdm", "llvmlite", "yaml"},
+    "eval": {
+        "numpy",
+        "scipy",
+        "pandas",
+        "matplotlib",
+        "rich",
+        "tqdm",
+        "llvmlite",
+        "yaml",
+        "statsmodels",
+        "optuna",
+        "ray",
+    },
 }
 # part -> parts that it may import, itself left out; a part is a folder, or the modules that lie in it directly
 LAWS = {"shield.definitions", "shield.params", "shield._numba"}
