@@ -5,7 +5,10 @@ import sys
 
 from rss_shield.eval.interrupt import stop_on_interrupt
 
-COMMANDS = {"train": ("rss_shield.train", "train", "train with and without the shield, test, compare")}
+COMMANDS = {
+    "train": ("rss_shield.train", "train", "train with and without the shield, test, compare"),
+    "sweep": ("rss_shield.eval.suite.sweep", "train", "run every task of an experiment file, here or on a cluster"),
+}
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"
 
 

@@ -35,6 +35,7 @@ SLOW = frozenset(
         "envs/test_stock",
         "envs/test_taken_back",
         "envs/test_wrapper",
+        "eval/test_backends",
         "eval/test_learning_curve",
         "eval/test_replay",
         "eval/test_rollout",

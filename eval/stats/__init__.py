@@ -1,7 +1,7 @@
-"""Statistics of episodes, seeds and arms: one function per statistic, and intervals that say over what.
+"""Statistics of episodes, seeds and arms: intervals that say over what.
 
-Two levels of chance are kept apart. *Episodes*: the agents are given, other test episodes would give other values. *Seeds
-and episodes*: other training seeds would give other agents, too. The second is what a claim about a method needs.
+Two levels of chance are kept apart. *Episodes*: the agents are given, other test episodes would give other values.
+*Seeds and episodes*: other training seeds would give other agents, too. A claim about a method needs the second.
 """
 
 from rss_shield.eval.stats.censored import completion_weights, weighted_mean, weighted_rate

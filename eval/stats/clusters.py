@@ -23,10 +23,10 @@ def cluster_bootstrap(
     """The mean over training seeds of a statistic of their episodes, with an interval over both.
 
     A resample draws S seeds, then of each drawn one as many episodes as it has (Davison & Hinkley 1997, sec. 3.8). They
-    give the standard error, times sqrt(S / (S - 1)) for what drawing from S seeds lacks; the interval is
-    Student's t with S - 1 degrees of freedom around the value. Percentiles of the resamples would be far too narrow for
-    the three to ten seeds of a training campaign. Seeds that agree as well as their episodes permit get an interval that
-    is up to sqrt(2) times too wide, never one without width.
+    give the standard error, times sqrt(S / (S - 1)) for what drawing from S seeds lacks; the interval is Student's t
+    with S - 1 degrees of freedom around the value. Percentiles of the resamples would be far too narrow for the three
+    to ten seeds of a training campaign. Seeds that agree as well as their episodes permit get an interval that is up to
+    sqrt(2) times too wide, never one without width.
 
     Args:
       seeds: S samples, `[K_s]` episodes each.

@@ -1,9 +1,9 @@
 """Scores of a few runs in several environments: interquartile mean, profile, probability of improvement.
 
-After Agarwal et al., "Deep Reinforcement Learning at the Edge of the Statistical Precipice", NeurIPS 2021.
-Intervals are percentiles of their stratified bootstrap, which draws runs of each environment by itself; with fewer than ten runs they
-hold the truth less often than they say (tests/eval/test_stats_coverage.py). The authors' rliable has the same, but draws
-from numpy's global generator, and what it needs does not go with pandas 3.
+After Agarwal et al., "Deep Reinforcement Learning at the Edge of the Statistical Precipice", NeurIPS 2021. Intervals
+are percentiles of their stratified bootstrap, which draws runs of each environment by itself; with fewer than ten runs
+they hold the truth less often than they say (tests/eval/test_stats_coverage.py). The authors' rliable has the same, but
+draws from numpy's global generator, and what it needs does not go with pandas 3.
 """
 
 from collections.abc import Callable
