@@ -5,11 +5,8 @@ from rss_shield.eval.interrupt import stop_on_interrupt
 if __name__ == "__main__":  # before all that takes its time
     stop_on_interrupt("train.py: stopping; nothing that is finished is lost, the same command with --resume goes on")
 
-import contextlib
 import functools
 import hashlib
-import io
-import json
 import math
 import multiprocessing
 import os
@@ -18,18 +15,18 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pandas as pd
-import tyro
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 import rss_shield
 from rss_shield.agents.blocks import available_devices, train_in_blocks
 from rss_shield.agents.learner import Learner, learner_of
 from rss_shield.agents.load import load_policy, policy_of
+from rss_shield.command_line import ConfigFile, fail, parsed, shown
 from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.envs.fast.config import Unsupported
 from rss_shield.envs.highway.idm_ego import make_idm_vec
@@ -37,7 +34,7 @@ from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import PENALTIES, PLANS, WAITING, default_preset, scheme_of
 from rss_shield.eval import drivers, removal
 from rss_shield.eval.arms import ARMS, FROM_OPTIONS, SHIELDED, Arm, arm_named, table
-from rss_shield.eval.config_option import read_config, split_arguments, with_values
+from rss_shield.eval.config_option import split_arguments, with_values
 from rss_shield.eval.jobs import Job, run_jobs
 from rss_shield.eval.replay import chosen, replay
 from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
@@ -48,6 +45,7 @@ from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
 
 TEST_ENVS = {"fast": 256, "highway-env": 1}  # side by side in testing; the engine is the faster, the more there are
+PROGRAM = "train.py"
 HELP = """Train agents with and without the RSS shield, test each with and without it, report who crashes.
 
 One table at the end: arms x shield {off, on} in testing; by default the arms are PPO with the shield {off, on} in
@@ -103,19 +101,6 @@ class Overrides:
     mu: float | None = None  # [m], >= 0: width of the lateral wobble
     standstill_gap: float | None = None  # lambda [m], >= 0: gap left when both stand
     v_cap: float | None = None  # [m/s], > 0: speed above which nobody accelerates
-
-
-# a file is read where the command line is
-ConfigFile = Annotated[
-    dict[str, Any],
-    tyro.constructors.PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="FILE",
-        instance_from_str=lambda texts: read_config(texts[0]),
-        is_instance=lambda value: isinstance(value, dict),
-        str_from_instance=lambda value: [json.dumps(value)],
-    ),
-]
 
 
 @dataclass(frozen=True)
@@ -199,7 +184,7 @@ def main(arguments: list[str]) -> None:
         env = tried(config, preset)
         warnings = open_run(folder, record(config, preset, env), resume=config.resume, overwrite=config.overwrite)
     except (ValueError, OSError) as error:
-        fail(" ".join(str(error).split()))
+        fail(PROGRAM, str(error))
     for warning in warnings:
         print(f"train.py: warning: {warning}", file=sys.stderr)
 
@@ -486,23 +471,7 @@ def _replay(config: Config, preset: Preset, folder: Path, arm: str, seed: int, t
 
 def parse(arguments: list[str], default: Config) -> Config:
     """Read the command line. What cannot be read ends in one line and exit code 2."""
-    printed = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(printed):
-            return tyro.cli(
-                Config,
-                prog="train.py",
-                description=HELP,
-                args=arguments,
-                default=default,
-                config=(tyro.conf.FlagCreatePairsOff,),
-            )
-    except SystemExit as stop:
-        if not stop.code:  # --help
-            raise
-        _, *box = (line.strip("│| ") for line in printed.getvalue().splitlines() if line.strip())
-        message = " ".join(line for line in box if line.strip("─-╰╯+"))
-        fail(re.split("Argument helptext|For full helptext", message)[0] + "(see train.py --help)")
+    return parsed(Config, PROGRAM, HELP, arguments, default)
 
 
 def check(config: Config) -> None:
@@ -512,7 +481,7 @@ def check(config: Config) -> None:
         try:
             arm_named(arm)
         except ValueError as error:
-            fail(f"--arms: {error}")
+            fail(PROGRAM, f"--arms: {error}")
     for option, good, expected in (
         ("backend", config.backend in BACKENDS, f"one of {', '.join(BACKENDS)}"),
         ("arms", is_set_of(config.arms, list(ARMS)), "one or more different names"),
@@ -539,7 +508,7 @@ def check(config: Config) -> None:
     ):
         if not good:
             value = shown(getattr(config, option))
-            fail(f"--{option.replace('_', '-')} {value} is out of range: expected {expected}")
+            fail(PROGRAM, f"--{option.replace('_', '-')} {value} is out of range: expected {expected}")
 
 
 def is_set_of(values: tuple, accepted: Sequence) -> bool:
@@ -618,23 +587,11 @@ def valid_name(text: str) -> str:
     return name
 
 
-def shown(value: Any, separator: str = " ") -> str:
-    """A value as on a command line."""
-    if value is None:
-        return "(not given)"
-    return separator.join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-
-
 _NOT_RECORDED = ("list_arms", "workers", "name", "runs_dir", "resume", "overwrite")
 
 
 def _given(overrides: Overrides) -> dict[str, float]:
     return {name: value for name, value in asdict(overrides).items() if value is not None}
-
-
-def fail(message: str) -> NoReturn:
-    print(f"train.py: error: {message}", file=sys.stderr)
-    raise SystemExit(2)
 
 
 def run(arguments: list[str]) -> None:

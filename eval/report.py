@@ -14,6 +14,7 @@ from rich.console import Console
 
 from rss_shield.eval import removal
 from rss_shield.eval.arms import Arm, arm_named
+from rss_shield.eval.cards import write_card
 from rss_shield.eval.files import atomic, write_json
 from rss_shield.eval.metrics import differences, summarise
 from rss_shield.eval.plots import plot_blame, plot_learning_curve
@@ -28,9 +29,10 @@ def write_report(folder: Path) -> None:
     """Read episodes/*.csv, replays/*.csv and */learning_curve.csv of a run; print and write table, figures, results.
 
     Writes episodes.csv, results.json, table.txt, .md, .tex and .csv, learning_curve.png and .pdf, removal.png and .pdf,
-    blame.png and .pdf; replays.csv if episodes were replayed.
+    blame.png and .pdf; the cards of the models; replays.csv if episodes were replayed.
     """
-    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
+    run = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    config = run["config"]
     arms, seeds = [arm_named(name) for name in config["arms"]], config["seeds"]
     models = [(arm.name, seed) for arm in arms if not arm.scripted for seed in seeds]
     cells = [
@@ -69,6 +71,9 @@ def write_report(folder: Path) -> None:
         f"{_given('ego', config['ego'])}{_given('other', config['other'])}, {_conduct(config)}"
         f"{config['total_timesteps']} timesteps per arm, {_penalty(config)}, {n_seeds}"
     )
+    for arm, seed in models:
+        of_model = (episodes["train"] == arm_named(arm).called) & (episodes["train_seed"] == seed)
+        write_card(folder / f"{arm}-seed{seed}", arm, seed, run, episodes[of_model])
     write_table(summary, folder, title, note)
     if curves:
         plot_learning_curve(pd.concat(curves, ignore_index=True), folder, str(config["env_id"]))
