@@ -5,6 +5,7 @@ reinforcement learning by PID Lagrangian methods", ICML 2020), once per rollout.
 """
 
 import csv
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,11 +26,16 @@ COLUMNS = (
 
 @dataclass
 class Pid:
-    """multiplier = max(0, kp error + integral + kd rise of what is measured), error = measured - target."""
+    """multiplier = kp error + integral + kd rise of what is measured, between 0 and `largest`.
+
+    Errors count in units of `scale`, and at most as one: at first, before anything is learnt, what is measured is often
+    many times its target, which says nothing about the price that will be needed.
+    """
 
     target: float  # wanted mean per decision
+    scale: float  # of the same kind
     kp: float
-    ki: float  # per rollout
+    ki: float  # the integral moves by at most this much per rollout
     kd: float
     largest: float  # value of the multiplier
     integral: float = 0.0
@@ -37,12 +43,13 @@ class Pid:
     multiplier: float = 0.0
 
     def update(self, measured: float) -> float:
-        error = measured - self.target
+        """The multiplier after a rollout with this mean per decision."""
+        error = min(max((measured - self.target) / self.scale, -1.0), 1.0)
         # no windup: what the multiplier cannot become is not remembered
         self.integral = min(max(self.integral + self.ki * error, 0.0), self.largest)
-        rise = 0.0 if np.isnan(self.measured) else max(measured - self.measured, 0.0)
+        rise = 0.0 if math.isnan(self.measured) else min(max((measured - self.measured) / self.scale, 0.0), 1.0)
         self.measured = measured
-        self.multiplier = float(min(max(self.kp * error + self.integral + self.kd * rise, 0.0), self.largest))
+        self.multiplier = min(max(self.kp * error + self.integral + self.kd * rise, 0.0), self.largest)
         return self.multiplier
 
 

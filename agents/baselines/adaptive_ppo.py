@@ -1,17 +1,17 @@
 """PPO that pays for interventions, at a price that moves until they are as many, or as large, as wanted."""
 
 import functools
-from typing import Any
 
+from gymnasium.vector import VectorEnv
 from rss_shield.agents import ppo
 from rss_shield.agents.learner import Learner
 from rss_shield.agents.multiplier import Meter, MultiplierRecorder, Pid
 from rss_shield.agents.vec_env import VectorEnvAdapter
 
-# what `penalty_on` names: where it is in infos, and the gains
-SIGNALS: dict[str, Any] = {
-    "response": (("shield", "override_fraction"), dict(kp=0.5, ki=0.1, kd=0.5, largest=5.0)),
-    "change": (("shield", "mean_acceleration_change"), dict(kp=0.02, ki=0.005, kd=0.02, largest=2.0)),
+# what `penalty_on` names: where it is in infos, the smallest scale of errors, and the gains
+SIGNALS: dict[str, tuple[tuple[str, ...], float, dict[str, float]]] = {
+    "response": (("shield", "override_fraction"), 0.005, dict(kp=0.1, ki=0.1, kd=0.1, largest=5.0)),
+    "change": (("shield", "mean_acceleration_change"), 0.1, dict(kp=0.01, ki=0.005, kd=0.01, largest=2.0)),
 }
 
 
@@ -23,7 +23,8 @@ def learner(target: float, penalty_on: str) -> Learner:
         of acceleration [m/s^2].
       penalty_on: "response" or "change".
     """
-    keys, gains = SIGNALS[penalty_on]
+    keys, least, gains = SIGNALS[penalty_on]
+    gains = {"scale": max(target, least), **gains}
     return ppo.learner()._replace(
         adapt=functools.partial(_adapt, keys),
         attributes=lambda: {"pid": Pid(target, **gains)},
@@ -32,5 +33,5 @@ def learner(target: float, penalty_on: str) -> Learner:
     )
 
 
-def _adapt(keys: tuple[str, ...], env: Any) -> VectorEnvAdapter:
+def _adapt(keys: tuple[str, ...], env: VectorEnv) -> VectorEnvAdapter:
     return VectorEnvAdapter(env, Meter(*keys))

@@ -22,7 +22,8 @@ from rss_shield.agents.multiplier import Meter, MultiplierRecorder, Pid
 from rss_shield.agents.vec_env import VectorEnvAdapter
 
 COST = ("cost",)
-GAINS: dict[str, float] = dict(kp=1.0, ki=0.5, kd=1.0, largest=20.0)
+LEAST_SCALE = 0.005  # of errors
+GAINS: dict[str, float] = dict(kp=0.25, ki=0.25, kd=0.25, largest=50.0)
 HIDDEN = 128  # units in each of the two layers of the cost critic, as in the other networks
 
 
@@ -32,13 +33,14 @@ def learner(cost_limit: float = 0.01) -> Learner:
     Args:
       cost_limit: wanted mean of info["cost"] per decision.
     """
+    gains = {"scale": max(cost_limit, LEAST_SCALE), **GAINS}
     return ppo.learner()._replace(
         algorithm=LagrangianPPO,
         options=lambda n_envs, total: {**ppo.options(n_envs, total), "rollout_buffer_class": CostBuffer},
         adapt=lambda env: VectorEnvAdapter(env, Meter(*COST, charges=False)),
-        attributes=lambda: {"pid": Pid(cost_limit, **GAINS)},
+        attributes=lambda: {"pid": Pid(cost_limit, **gains)},
         callbacks=lambda: [MultiplierRecorder("cost")],
-        notes={**ppo.learner().notes, "rollout_buffer_class": "CostBuffer", "cost_limit": cost_limit, **GAINS},
+        notes={**ppo.learner().notes, "rollout_buffer_class": "CostBuffer", "cost_limit": cost_limit, **gains},
     )
 
 
