@@ -3,6 +3,7 @@
 import functools
 
 from gymnasium.vector import VectorEnv
+
 from rss_shield.agents import ppo
 from rss_shield.agents.learner import Learner
 from rss_shield.agents.multiplier import Meter, MultiplierRecorder, Pid
