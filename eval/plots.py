@@ -62,7 +62,7 @@ def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
         figure = Figure(figsize=(6.5, 4.6))
         for axes, (name, values, statistic) in zip(figure.subplots(2, 2, sharex=True).flat, panels, strict=True):
             for arm, rows in curve.groupby("arm", sort=False):
-                label = f"{arm} (n = {len(rows)} episodes, {_seeds(rows['train_seed'].nunique())})"
+                label = f"{arm} (n = {len(rows)} episodes, {seeds_text(rows['train_seed'].nunique())})"
                 points = [
                     ((low + high) / 2, _point(statistic, values[inside.index], inside))
                     for low, high, inside in bins[arm]
@@ -183,7 +183,7 @@ def _line(axes: Axes, points: list[tuple[float, Interval]], label: str, arm: str
 
 def style_of(arm: str) -> dict[str, Any]:
     """Colour and marker of an arm, so that more arms than colours are told apart."""
-    markers = "osD^v<>pP*X"
+    markers = "osD^v<>pPXhd"
     return {"color": ARMS[arm].colour, "marker": markers[list(ARMS).index(arm) // 2 % len(markers)]}
 
 
@@ -192,7 +192,7 @@ def _whisker(axes: Axes, x: float, interval: Interval) -> None:
     axes.errorbar(x, interval.value, [[below], [above]], color="black", capsize=2.5, linewidth=0.9, fmt="none")
 
 
-def _seeds(count: int) -> str:
+def seeds_text(count: int) -> str:
     return f"{count} seed" if count == 1 else f"{count} seeds"
 
 

@@ -16,7 +16,7 @@ from scipy import stats
 
 from rss_shield.eval.files import write_text
 from rss_shield.eval.metrics import with_outcomes
-from rss_shield.eval.plots import STYLE, save, style_of
+from rss_shield.eval.plots import STYLE, save, seeds_text, style_of
 from rss_shield.eval.stats import Interval, wilson
 
 FILE = "removal_curve.csv"
@@ -29,6 +29,7 @@ COLUMNS = (
     "return",  # mean of the raw rewards' sum
     "return_sd",  # standard deviation over the episodes
     "intervention",  # mean share of frames that a proper response overrode
+    "change",  # mean change of acceleration [m/s^2]
 )
 
 
@@ -68,6 +69,7 @@ def row_of(timesteps: int, test: str, episodes: pd.DataFrame) -> dict[str, objec
         "return": float(returns.mean()),
         "return_sd": float(returns.std(ddof=1)) if len(returns) > 1 else 0.0,
         "intervention": float(episodes["override_share"].mean()),
+        "change": float(episodes["mean_acceleration_change"].mean()),
     }
 
 
@@ -82,7 +84,7 @@ def plot_removal(rows: pd.DataFrame, folder: Path, title: str) -> None:
         ("Crashes without the shield", "off", "crash"),
         ("Ego at fault without the shield", "off", "at_fault"),
         ("Return without the shield", "off", "return"),
-        ("Frames overridden with the shield", "on", "intervention"),
+        ("Change by the shield [m/s²]", "on", "change"),
     )
     with matplotlib.rc_context(STYLE):
         arms = list(rows["arm"].unique())
@@ -94,11 +96,11 @@ def plot_removal(rows: pd.DataFrame, folder: Path, title: str) -> None:
                 look = style_of(arm)
                 seeds = chosen["train_seed"].nunique()
                 x = [t for t, _ in points]
-                axes.plot(x, [p.value for _, p in points], label=f"{arm} ({seeds} seeds)", markersize=3, **look)
+                axes.plot(x, [p.value for _, p in points], label=f"{arm} ({seeds_text(seeds)})", markersize=3, **look)
                 low, high = [p.low for _, p in points], [p.high for _, p in points]
                 axes.fill_between(x, low, high, color=look["color"], alpha=0.15, linewidth=0)
             axes.set_title(name, loc="left")
-            if value != "return":
+            if value in ("crash", "at_fault"):
                 axes.yaxis.set_major_formatter(PercentFormatter(1.0))
                 axes.set_ylim(-0.03, 1.03)
             if axes.get_subplotspec().is_last_row():

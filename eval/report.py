@@ -16,6 +16,7 @@ from rss_shield.eval import removal
 from rss_shield.eval.arms import Arm, arm_named
 from rss_shield.eval.cards import write_card
 from rss_shield.eval.files import atomic, write_json
+from rss_shield.eval.frontier import plot_frontier
 from rss_shield.eval.metrics import differences, summarise
 from rss_shield.eval.plots import plot_blame, plot_learning_curve
 from rss_shield.eval.replay import compare, verdict
@@ -29,7 +30,8 @@ def write_report(folder: Path) -> None:
     """Read episodes/*.csv, replays/*.csv and */learning_curve.csv of a run; print and write table, figures, results.
 
     Writes episodes.csv, results.json, table.txt, .md, .tex and .csv, learning_curve.png and .pdf, removal.png and .pdf,
-    blame.png and .pdf; the cards of the models; replays.csv if episodes were replayed.
+    blame.png and .pdf, the cards of the models; frontier.png and .pdf with more than two arms; replays.csv if episodes
+    were replayed.
     """
     run = json.loads((folder / "config.json").read_text(encoding="utf-8"))
     config = run["config"]
@@ -77,6 +79,8 @@ def write_report(folder: Path) -> None:
     write_table(summary, folder, title, note)
     if curves:
         plot_learning_curve(pd.concat(curves, ignore_index=True), folder, str(config["env_id"]))
+    if len(arms) > 2:
+        plot_frontier(summary, folder, str(config["env_id"]))
     if len(removals):
         removal.plot_removal(removals, folder, str(config["env_id"]))
     plot_blame(episodes, folder, str(config["env_id"]))
