@@ -7,6 +7,7 @@ from rss_shield.eval.interrupt import stop_on_interrupt
 
 COMMANDS = {
     "train": ("rss_shield.train", "train", "train with and without the shield, test, compare"),
+    "test": ("rss_shield.test", "train", "test a model or a policy with the shield and without"),
     "sweep": ("rss_shield.eval.suite.sweep", "train", "run every task of an experiment file, here or on a cluster"),
 }
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"

@@ -11,7 +11,7 @@ from places import ROOT
 LIBRARIES = {
     "shield": {"numpy", "numba"},
     "envs": {"gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo"},
-    "agents": {"gymnasium", "stable_baselines3", "torch", "numpy"},
+    "agents": {"gymnasium", "sb3_contrib", "stable_baselines3", "torch", "numpy"},
     "eval": {
         "numpy",
         "scipy",
@@ -31,7 +31,7 @@ LIBRARIES = {
 # part -> parts that it may import, itself left out; a part is a folder, or the modules that lie in it directly
 LAWS = {"shield.definitions", "shield.params", "shield._numba"}
 OWES = {"shield.geometry", "shield.command", "shield.chosen", "shield.anything", "shield.comfort"}
-BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions"}
+BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions", "shield.filters"}
 ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
 ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
 MAY_IMPORT = {
@@ -41,12 +41,14 @@ MAY_IMPORT = {
     "shield.risk": LAWS | OWES,
     "shield.lanes": LAWS | OWES,
     "shield.junctions": LAWS | OWES | {"shield.lanes"},  # a verdict is one on either kind of road
+    "shield.filters": LAWS | OWES | {"shield.lanes"},
     "envs._numpy": {"envs.compiled", "shield._numba"},
     "envs.compiled": {"envs._numpy", "shield._numba"},
     "envs.roads": ROADS | BELOW,
     "envs.worlds": {"envs.stock"} | ROADS | BELOW,
-    "envs.highway": ROADS | ENTRY | BELOW | {"envs.make", "shield.risk"},
-    "envs.fast": ROADS | ENTRY | BELOW,
+    "envs.decisions": ROADS | BELOW,
+    "envs.highway": ROADS | ENTRY | BELOW | {"envs.decisions", "envs.make", "shield.risk"},
+    "envs.fast": ROADS | ENTRY | BELOW | {"envs.decisions"},
     "eval.stats": set(),
     "eval.runs": {"eval.stats", "eval.metrics", "eval.plots", "eval.table", "eval.files"}
     | {"eval.config_option", "eval.interrupt"},

@@ -12,6 +12,7 @@ from rss_shield.envs.roads.steering import MAX_SLIP
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.response import AXES
+from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
 from rss_shield.shield.lanes.controller import (
     Body,
@@ -19,6 +20,7 @@ from rss_shield.shield.lanes.controller import (
     find_danger,
     respond,
 )
+from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
 from rss_shield.shield.lanes.judge import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
@@ -84,6 +86,7 @@ class StepTally:
     def __init__(self) -> None:
         self.frames = self.overridden = self.anticipated = self.limited = 0
         self.dangerous_pairs = self.broken_duties = 0
+        self.acceleration = self.steering = 0.0  # sums of what was executed
         self.acceleration_change = self.steering_change = 0.0  # largest
         self.acceleration_changed = self.steering_changed = 0.0  # sums over the frames
         self.lane_change_refused = False
@@ -135,6 +138,7 @@ class ShieldedEgo:
         self.record: list[Frame] | None = [] if record else None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
         self.judge = self  # or another, which watches by a table of its own
+        self.answers = False  # does a filter that looks once per decision respond in this one?
         vehicle.act = self.act
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
@@ -180,7 +184,7 @@ class ShieldedEgo:
         response = Response(wish, False, False, False)
         if settings.overrides:
             body = Body(*self.body, bend.curvature, bend.slack, self.backs_up)
-            response = respond(self._taken_back(wish, ego, body), danger, ego, body, settings.rules, settings.dt)
+            response = self._respond(wish, danger, ego, users, body)
         command = response.command
         pairs, broken = judge_frame(
             ego, users, self.memory, command, bend.curvature, settings.ego, settings.other, settings.dt
@@ -194,6 +198,7 @@ class ShieldedEgo:
             vehicle.action = dict(nominal)
         before, self.last = self.last, (ego, users)
         changes = command.acceleration - wish.acceleration, steered - steering
+        self._note_executed(command.acceleration, steered)
         self._count(danger, response, response.anticipated, pairs, broken, *changes)
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.dt)
         tally = self.tally
@@ -203,6 +208,24 @@ class ShieldedEgo:
         if self.record is not None:
             seen = ego, users, bend.curvature, tuple(self.jumped), *before
             self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
+
+    def _respond(self, wish: Command, danger, ego, users, body: Body) -> Response:
+        """What the filter in force makes of a command."""
+        settings = self.settings
+        if settings.filter.kind != RSS:
+            rules = settings.ego, settings.other, settings.rules, settings.dt
+            traffic = Traffic(ego, users, self.memory, self._offset_from_target(), None)
+            state = self.answers, self.tally.frames == 0
+            response, self.answers = answer(settings.filter, wish, traffic, danger.free, *state, body, *rules)
+            return response
+        response = respond(self._taken_back(wish, ego, body), danger, ego, body, settings.rules, settings.dt)
+        if settings.correction == RESPONSE:
+            response = in_full(response, danger, ego, body, settings.rules, settings.dt)
+        return response
+
+    def _note_executed(self, acceleration: float, steering: float) -> None:
+        self.tally.acceleration += acceleration
+        self.tally.steering += steering
 
     def _count(
         self,
@@ -253,13 +276,21 @@ class ShieldedEgo:
         vehicle = self.vehicle
         if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.contact is not None:
             return
-        target = vehicle.target_lane_index
-        if target == before or target[:2] != before[:2]:
-            return
-        back = turns_back(self._offset(vehicle.lane_index), self._offset(before), target[2] - before[2])
-        if back or self._is_blocked(target):
+        if self.is_refused(before, vehicle.target_lane_index):
             vehicle.target_lane_index = before
             self.tally.lane_change_refused = True
+
+    def is_refused(self, before, target) -> bool:
+        """Is a change from one lane to another blocked, or does it come half-way through another?"""
+        if not self.settings.rules.take_back or target == before or target[:2] != before[:2]:
+            return False
+        back = turns_back(self._offset(self.vehicle.lane_index), self._offset(before), target[2] - before[2])
+        return bool(back or self._is_blocked(target))
+
+    def _offset_from_target(self) -> float:
+        """Offset from the centre of the lane that the ego heads for, positive to the right [m]."""
+        target = getattr(self.vehicle, "target_lane_index", None)
+        return 0.0 if target is None else self._offset(target)
 
     def _is_blocked(self, index) -> bool:
         """Is the way to the centre of a lane blocked?"""

@@ -65,6 +65,7 @@ class JunctionEgo(ShieldedEgo):
         granted = report.acceleration if settings.overrides else acceleration
         if settings.overrides:
             vehicle.action = {"steering": steered, "acceleration": granted}
+        self._note_executed(granted, steered)
         if settings.overrides and report.overridden and self.tally.partner < 0:
             held = int(held_by(scene, acceleration, len(self.others), not settings.waits_anywhere))
             self.tally.partner = self._index_on_road(held) if held >= 0 else -1
