@@ -56,7 +56,13 @@ MAY_IMPORT = {
 # what a package may import besides itself; one part of eval knows simulators and agents
 BELOW_PACKAGE = {
     "envs": {"rss_shield.shield"},
-    "eval.suite": {"rss_shield.shield", "rss_shield.envs", "rss_shield.agents"},
+    "eval.suite": {
+        "rss_shield",
+        "rss_shield.shield",
+        "rss_shield.envs",
+        "rss_shield.agents",
+        "rss_shield.command_line",
+    },
 }
 MODULES = [path for package in LIBRARIES for path in sorted((ROOT / package).rglob("*.py"))]
 PARTED = [path for path in MODULES if path.name != "__init__.py" or len(path.relative_to(ROOT).parts) > 2]

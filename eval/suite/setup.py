@@ -13,7 +13,10 @@ from rss_shield.eval.runs.names import check_names, nested
 from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
 
 OTHERS = {"reckless": RECKLESS, **HOSTILE}  # who else is on the road, by name
-_SHIELD = ("entry", "intent", "waiting", "examine", "traffic")
+_SHIELD = (
+    *("entry", "intent", "waiting", "examine", "traffic", "risk"),
+    *("filter", "filter_at", "correction", "replace", "intervention_penalty", "penalty_on"),
+)
 _TABLE = ("preset", "ego", "other")
 KNOWN = ("shield", "backend", "others", "config", "rules", "judge", *_TABLE, *_SHIELD)
 DEFAULT_PRESET = "simulator"
@@ -26,8 +29,8 @@ def setup_of(environment: str, options: Mapping[str, Any]) -> dict[str, Any]:
       environment: its id.
       options: dotted names -> values: shield (override, monitor), backend (fast, highway-env), preset,
         ego.NAME and other.NAME (`RSSParams`), rules.NAME (`Rules`), judge.preset, judge.ego.NAME, judge.other.NAME,
-        judge.rules.NAME (one judge for all settings; on highway-env only), entry, intent, waiting, examine, traffic,
-        others (stock, or who in `OTHERS`), config.NAME (of the environment).
+        judge.rules.NAME (one judge for all settings; on highway-env only), the other options of `ShieldWrapper` by
+        their names, others (stock, or who in `OTHERS`), config.NAME (of the environment).
 
     Raises:
       ValueError: an unknown name, with the nearest known one, or a value out of range.

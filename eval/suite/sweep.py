@@ -50,7 +50,11 @@ class Arguments:
 
 def do_task(config: dict[str, Any]) -> Files:
     """Any task, by its configuration."""
-    return scripted_task(config)
+    if "arm" not in config:
+        return scripted_task(config)
+    from rss_shield.eval.suite.trained import trained_task  # PyTorch takes its time
+
+    return trained_task(config)
 
 
 class Sweep:
@@ -137,12 +141,15 @@ class Sweep:
             points.setdefault(to_json(point), (point, {}))[1][task.config["seed"]] = task
         rows = []
         for point, seeds in points.values():
-            if all(self.store.has(task) for task in seeds.values()):
-                rows += point_row(
-                    point,
-                    {seed: self.episodes(task) for seed, task in seeds.items()},
-                    pooled=not self.experiment.arms,
-                )
+            if not all(self.store.has(task) for task in seeds.values()):
+                continue
+            frames = {seed: self.episodes(task) for seed, task in seeds.items()}
+            if not self.experiment.arms:
+                rows += point_row(point, frames, pooled=True)
+                continue
+            for test in next(iter(frames.values()))["test"].unique():
+                tested = {seed: frame[frame["test"] == test] for seed, frame in frames.items()}
+                rows += point_row({**point, "test": test}, tested)
         return pd.DataFrame(rows)
 
 
@@ -154,8 +161,13 @@ def _suggest(trial: Any, name: str, space: Any) -> Any:
 
 def check_tasks(tasks: list[Task]) -> None:
     """Refuse bad options before anything runs."""
-    for task in {to_json([task.config["environment"], task.config["options"]]): task for task in tasks}.values():
-        setup_of(task.config["environment"], task.config["options"])
+    for task in {to_json({**task.config, "seed": 0}): task for task in tasks}.values():
+        if "arm" in task.config:
+            from rss_shield.eval.suite.trained import check_trained
+
+            check_trained(task.config)
+        else:
+            setup_of(task.config["environment"], task.config["options"])
 
 
 def sweep(experiment: Experiment, folder: Path, work: Work = do_task, **run: Any) -> Sweep:
