@@ -8,6 +8,7 @@ from rss_shield.eval.interrupt import stop_on_interrupt
 COMMANDS = {
     "train": ("rss_shield.train", "train", "train with and without the shield, test, compare"),
     "test": ("rss_shield.test", "train", "test a model or a policy with the shield and without"),
+    "report": ("rss_shield.eval.paper.command", "train", "one page of what came out of runs and sweeps"),
     "sweep": ("rss_shield.eval.suite.sweep", "train", "run every task of an experiment file, here or on a cluster"),
 }
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"

@@ -37,6 +37,7 @@ SLOW = frozenset(
         "envs/test_wrapper",
         "eval/test_backends",
         "eval/test_learning_curve",
+        "eval/test_paper",
         "eval/test_replay",
         "eval/test_rollout",
         "eval/test_stats_coverage",

@@ -88,9 +88,7 @@ def with_front(wide: pd.DataFrame, safety: str, performance: str) -> pd.DataFram
     Args:
       wide: a row per point; columns of the metrics' values.
     """
-    costs = np.column_stack(
-        [wide[name] * (1.0 if name in LESS_IS_BETTER else -1.0) for name in (safety, performance)]
-    )
+    costs = np.column_stack([wide[name] * (1.0 if name in LESS_IS_BETTER else -1.0) for name in (safety, performance)])
     front = np.zeros(len(wide), bool)
     for _, rows in groups_of(wide):
         front[rows] = pareto_front(costs[rows])

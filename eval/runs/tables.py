@@ -114,7 +114,10 @@ def plot_front(table: pd.DataFrame, axes: list[str], safety: str, performance: s
 
 def _panel(plot: Axes, table: pd.DataFrame, axes: list[str], safety: str, performance: str) -> None:
     x, y = metric_named(performance), metric_named(safety)
-    for on, colour, marker, label in ((False, BEATEN, "o", "beaten by another"), (True, FRONT, "s", "on the Pareto front")):
+    for on, colour, marker, label in (
+        (False, BEATEN, "o", "beaten by another"),
+        (True, FRONT, "s", "on the Pareto front"),
+    ):
         rows = table[table["front"] == on]
         style: Any = {"fmt": marker, "color": colour, "markersize": 4, "elinewidth": 0.6, "label": label}
         style |= {"xerr": _reach(rows, x), "yerr": _reach(rows, y)}
@@ -132,5 +135,8 @@ def _panel(plot: Axes, table: pd.DataFrame, axes: list[str], safety: str, perfor
 def _reach(rows: pd.DataFrame, metric: Metric) -> np.ndarray:
     """`[2, N]` below and above; nothing where it is not known."""
     value = rows[metric.name].to_numpy(float)
-    below, above = value - rows[f"{metric.name}_low"].to_numpy(float), rows[f"{metric.name}_high"].to_numpy(float) - value
+    below, above = (
+        value - rows[f"{metric.name}_low"].to_numpy(float),
+        rows[f"{metric.name}_high"].to_numpy(float) - value,
+    )
     return metric.scale * np.nan_to_num(np.maximum([below, above], 0.0))
