@@ -104,7 +104,10 @@ def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
 
 
 # options that the engine has no answer to, and what says that nobody asks
-_OF_HIGHWAY_ENV = {"traffic": "stock", "record": False, "risk": False, "judge_params": None, "judge_rules": None}
+_OF_HIGHWAY_ENV = {
+    **{"traffic": "stock", "record": False, "risk": False, "measures": False},
+    **{"judge_params": None, "judge_rules": None},
+}
 _OF_GYMNASIUM = {  # arguments of its `make_vec` that mean something else here
     "vectorization_mode": "backend = 'fast' or 'highway-env'",
     "vector_kwargs": "autoreset_mode and threads",

@@ -48,7 +48,7 @@ MAY_IMPORT = {
     "envs.worlds": {"envs.stock"} | ROADS | BELOW,
     "envs.decisions": ROADS | BELOW,
     "envs.highway": ROADS | ENTRY | BELOW | {"envs.decisions", "envs.make", "shield.risk"},
-    "envs.fast": ROADS | ENTRY | BELOW | {"envs.decisions"},
+    "envs.fast": ROADS | ENTRY | BELOW | {"envs.decisions", "shield.risk"},
     "eval.stats": set(),
     "eval.runs": {"eval.stats", "eval.metrics", "eval.plots", "eval.table", "eval.files"}
     | {"eval.config_option", "eval.interrupt"},

@@ -132,6 +132,7 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
         "min_ttc": min(ego.min_ttc, LONGEST_TTC),
         **comfort_of(ego.ride)._asdict(),
         **(ego.meter.info() if ego.meter is not None else {}),
+        **({"measures": ego.measured.info(ego)} if ego.measured is not None else {}),
     }
 
 

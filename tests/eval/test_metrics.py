@@ -9,7 +9,10 @@ from rss_shield.eval.metrics import AT_FAULT, BLAMES, METRICS, differences, summ
 from rss_shield.shield.lanes import judge
 
 # (blame, crashed, simulator's own meaning): the six things that can happen
-OF_A_GOAL = ("success", "time_to_goal")
+OF_A_GOAL = {"success", "time_to_goal"}
+MEASURED = {"frozen", "near_misses", "impact", "impact_delta_v", "min_thw", "max_drac", "min_pet"} | {
+    *("violation_ego", "violation_other", "shield_time"),
+}
 OUTCOMES = ["", "ego", "both", "other", "inherited", "none"]
 
 
@@ -33,7 +36,7 @@ def test_a_crash_without_a_verdict_is_not_lost():
 
 def test_a_cell_is_summarised_by_hand_computed_values():
     summary = summarise(episodes_of(["ego", "both", "other", ""])).set_index("metric")
-    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in OF_A_GOAL]
+    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in OF_A_GOAL | MEASURED]
     expected = {
         "crash": 3 / 4,
         "at_fault": 2 / 4,
@@ -64,7 +67,7 @@ def crossings_of(times: list[float], successes: list[bool], test: str = "off") -
 
 def test_the_time_to_the_goal_is_that_of_the_episodes_that_reach_it():
     summary = summarise(crossings_of([6.0, 13.0, 8.0, 13.0], [True, False, True, False])).set_index("metric")
-    assert list(summary.index) == [metric.name for metric in METRICS]
+    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in MEASURED]
     assert summary.loc["success", ["value", "n"]].tolist() == [0.5, 4]
     assert summary.loc["time_to_goal", ["value", "n"]].tolist() == [7.0, 2]  # mean of 6 and 8
 
@@ -87,7 +90,7 @@ def test_times_to_the_goal_are_compared_where_both_reach_it():
 def test_cells_keep_their_order_and_the_same_episodes_give_the_same_summary():
     episodes = pd.concat([episodes_of(["ego"] * 5, "on", "off"), episodes_of([""] * 5, "off", "on")])
     first, second = summarise(episodes), summarise(episodes)
-    assert list(zip(first["train"], first["test"], strict=True))[:: len(METRICS) - len(OF_A_GOAL)] == [
+    assert list(zip(first["train"], first["test"], strict=True))[:: len(METRICS) - len(OF_A_GOAL | MEASURED)] == [
         ("on", "off"),
         ("off", "on"),
     ]
