@@ -70,6 +70,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--examine some", "examine = 'some': expected one of"),
         ("--filter abs", "filter = 'abs': expected one of rss"),
         ("--risk", "the fast engine does not support risk = True"),
+        ("--tracker paper", "--tracker paper is out of range: expected one of tensorboard, wandb, mlflow"),
         ("--entry bold", "--entry bold is out of range: expected one of cautious, priority, assertive"),
         ("--intent left", "--intent left is out of range: expected one of known, straight, any"),
         ("--waiting nowhere", "--waiting nowhere is out of range: expected one of line, anywhere"),

@@ -1,8 +1,8 @@
 """What an episode looked like from outside: distances in time, near misses, encroachments, standing still, impacts.
 
-Names are those of CommonRoad-CriMe where it has the measure: TTC, THW, PET (post-encroachment time), DeltaV; DRAC is minus
-its ALongReq for a leader at constant speed. Everything is read off positions, headings, speeds and boxes in the world, so
-highway-env, the engine's recordings and logs of anything else are measured alike. Nothing here filters.
+Names are those of CommonRoad-CriMe where it has the measure: TTC, THW, PET (post-encroachment time), DeltaV; DRAC is
+minus its ALongReq for a leader at constant speed. Everything is read off positions, headings, speeds and boxes in the
+world, so highway-env, the engine's recordings and logs of anything else are measured alike. Nothing here filters.
 
 Ahead is along the ego's heading, as if its lane went straight on.
 """
