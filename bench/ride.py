@@ -32,12 +32,12 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.stock import make_stock
 from rss_shield.eval.files import write_text
-from rss_shield.eval.metrics import AT_FAULT
 from rss_shield.eval.rollout import evaluate, run_episode
 from rss_shield.eval.stats import paired_difference
 from rss_shield.shield.definitions.kinematics import frames_for
 from rss_shield.shield.lanes.pair import assess
 from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.verdicts import AT_FAULT
 
 ROADS = (
     *("highway-fast-v0", "highway-v0", "merge-v0", "merge-v1", "exit-v0", "two-way-v0", "u-turn-v0"),

@@ -11,9 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rss_shield.eval.stats import Interval, bootstrap_mean, bootstrap_median, paired_difference, student, wilson
-
-BLAMES = ("ego", "both", "other", "inherited", "none")
-AT_FAULT = ("ego", "both")
+from rss_shield.shield.verdicts import AT_FAULT, BLAMES
 
 
 class Metric(NamedTuple):

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from rss_shield.eval.files import atomic
-from rss_shield.eval.metrics import AT_FAULT, BLAMES
 from rss_shield.eval.stats import Interval, completion_weights, weighted_mean, weighted_rate, wilson
+from rss_shield.shield.verdicts import AT_FAULT, BLAMES
 
 # Okabe & Ito's colours, told apart with every common colour blindness
 ARM_COLOURS = {"unshielded": "#D55E00", "shielded": "#0072B2"}

@@ -9,9 +9,10 @@ import numpy as np
 
 from rss_shield.shield import PRESETS, Rules
 from rss_shield.shield.command import Command
-from rss_shield.shield.lanes.judge import DUTIES, VERDICTS, judge_contact, judge_frame
+from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.memory import MEMORY, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
+from rss_shield.shield.verdicts import DUTIES, VERDICTS
 
 DT = 0.5
 LOG = {  # the ego drives on while the other brakes to rest

@@ -26,13 +26,10 @@ from rss_shield.envs.fast.guard import (
     check_contact,
     compile_ways,
     distances_of,
-    is_at_fault,
     make_watch,
     no_ways,
     plans_of,
     refuse_lane_change,
-    report_comfort,
-    start_tally,
     start_watch,
     watch_frame,
 )
@@ -50,10 +47,11 @@ from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, ra
 from rss_shield.shield.comfort import RIDE
 from rss_shield.shield.junctions.controller import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.tally import end_decision, start_decision
+from rss_shield.shield.verdicts import charges_ego
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
 DECIDE, RESTART, STAY = range(3)  # what an environment does on a call
-_LONGEST_TTC = 100.0  # [s]
 _PATIENCE = 6.0  # seconds of silence before the first call explains itself
 
 
@@ -142,7 +140,7 @@ def _restart(cars, episode, order, world, sight, distances, plans, ride, watch, 
     survey(cars, episode, world.network, sight, world.flow)
     sort_along_x(cars, episode.cars, order)
     start_watch(episode, distances, plans, ride, watch)
-    start_tally(step)
+    start_decision(step)
     step.raw_reward = rate(cars, episode, NO_ACTION, lanes, sight, config, step)
     _report(cars, episode, ride, mode, 0.0, step)
     _see_apart(cars, episode, world, sight, out)
@@ -177,22 +175,7 @@ def _report(cars, episode, ride, mode, cost, step):
     step.speed, step.crashed, step.time = ego.speed, ego.crashed, episode.time
     step.episode_return, step.episode_length = episode.return_, episode.steps
     if mode != OFF:
-        episode.cost += cost
-        step.cost, step.episode_cost = cost, episode.cost
-        frames = max(episode.frames, 1)
-        step.override_share = episode.frames_overridden / frames
-        step.anticipation_share = episode.frames_anticipated / frames
-        step.limited_share = episode.frames_limited / frames
-        step.mean_acceleration_change = episode.acceleration_changed / frames
-        step.mean_steering_change = episode.steering_changed / frames
-        report_comfort(ride, step)
-        step.episode_dangerous_pairs = episode.dangerous_pairs
-        step.episode_broken_duties = episode.broken_duties
-        step.min_ttc = min(episode.min_ttc, _LONGEST_TTC)
-        step.blame, step.blame_partner = episode.blame, episode.blame_partner
-        step.blame_axes, step.blame_frames = episode.blame_axes, episode.blame_frames
-        step.ego_duty, step.ego_excess = episode.ego_duty, episode.ego_excess
-        step.other_duty, step.other_excess = episode.other_duty, episode.other_excess
+        end_decision(step, episode, ride, cost)
 
 
 @unfolded
@@ -202,7 +185,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, ride, watc
     lanes = net.lanes
     ego = cars[episode.ego]
     survey(cars, episode, net, sight, flow)
-    start_tally(step)
+    start_decision(step)
     had_contact = episode.blame != 0
     for frame in range(config.frames):
         if frame == 0:
@@ -233,7 +216,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, ride, watc
     cost = 0.0
     if mode != OFF:
         check_contact(cars, episode, lanes, sight, distances, plans, watch, settings)
-        if step.broken_duties > 0 or (not had_contact and is_at_fault(episode.blame)):
+        if step.broken_duties > 0 or (not had_contact and charges_ego(episode.blame - 1)):
             cost = 1.0
     return cost
 

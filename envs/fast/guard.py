@@ -26,19 +26,20 @@ from rss_shield.envs.roads.ways import (
     track_of,
 )
 from rss_shield.shield._numba.compiled import inner, part, rare
-from rss_shield.shield.comfort import comfort_of, ride_on
+from rss_shield.shield.comfort import ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.geometry import largest_half_extents
 from rss_shield.shield.junctions.controller import CROSSING, has_plan, judge_crossing, junction_frame
 from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.plans import Scene
 from rss_shield.shield.lanes.controller import Body, Response, find_danger, respond
-from rss_shield.shield.lanes.judge import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
+from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up
+from rss_shield.shield.tally import count_change, count_frame, enter_contact, start_episode
+from rss_shield.shield.verdicts import weight_of
 
 OFF, MONITOR, OVERRIDE = range(3)
-_PLANS = 4  # kinds of danger from here on are plans, in `infos`
 
 
 class Ways(NamedTuple):
@@ -129,14 +130,7 @@ def start_watch(episode, distances, plans, ride, watch):
     episode.held_at, episode.wronged = np.inf, False
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
-    episode.frames = episode.frames_overridden = episode.frames_anticipated = episode.frames_limited = 0
-    episode.acceleration_changed = episode.steering_changed = 0.0
-    episode.dangerous_pairs = episode.broken_duties = 0
-    episode.cost = 0.0
-    episode.min_ttc = np.inf
-    episode.blame = episode.blame_axes = episode.blame_frames = episode.ego_duty = episode.other_duty = 0
-    episode.blame_partner = -1
-    episode.ego_excess = episode.other_excess = 0.0
+    start_episode(episode)
 
 
 @part
@@ -151,17 +145,6 @@ def carry_over(episode, cars, crossings, ego, watch):
         was = cars[k].was if k < episode.cars else -1
         # those after a gap move up
         crossings[i] = watch.blank_crossing[0] if was < 0 else crossings[was if was < ego else was - 1]
-
-
-@inner
-def start_tally(step):
-    """Nothing has happened in this decision yet."""
-    step.frames = step.overridden = step.anticipated = step.limited = 0
-    step.dangerous_pairs = step.broken_duties = 0
-    step.acceleration_change = step.steering_change = step.acceleration_changed = step.steering_changed = 0.0
-    step.lane_change_refused = False
-    step.margin_lon = step.margin_lat = np.inf
-    step.partner, step.response = -1, 0
 
 
 @inner
@@ -232,13 +215,13 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         if command.slip != wish.slip:
             steered = arctan(2.0 * tan(command.slip))
         car.acceleration, car.steering = command.acceleration, steered
-        _count_change(episode, step, abs(command.acceleration - acceleration), abs(steered - steering))
+        count_change(step, episode, abs(command.acceleration - acceleration), abs(steered - steering))
     pairs = broken = 0
     if danger.dangerous:
         pairs, broken = judge_frame(
             ego, users, memory, response.command, bend.curvature, settings.ego, settings.other, settings.dt, who
         )
-    _count(episode, step, danger, response, response.anticipated, pairs, broken, settings.overrides)
+    _count(episode, step, danger, response, pairs, broken, settings.overrides)
     if danger.partner >= 0:
         step.margin_lon, step.margin_lat = danger.margin_lon, danger.margin_lat
         step.partner = car_of(danger.partner, episode)
@@ -265,46 +248,22 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
         if report.overridden and step.partner < 0:
             held = held_by(scene, car.acceleration, n, not settings.waits_anywhere)
             step.partner = car_of(held, episode) if held >= 0 else -1
-        _count_change(episode, step, abs(report.acceleration - car.acceleration), 0.0)
+        count_change(step, episode, abs(report.acceleration - car.acceleration), 0.0)
         car.acceleration = report.acceleration
-    _count(episode, step, report, report, report.anticipated, report.pairs, report.broken, settings.overrides)
+    _count(episode, step, report, report, report.pairs, report.broken, settings.overrides)
     episode.frames_trapped += report.trapped
     episode.pairs_examined += report.examined
     episode.pairs_possible += report.possible
 
 
 @inner
-def _count(episode, step, danger, response, anticipated, pairs, broken, overrides):
+def _count(episode, step, danger, response, pairs, broken, overrides):
     """Take what happened on one frame into the tally."""
     overridden = (response.overridden or episode.refused) and overrides
-    limited = response.limited and not overridden and overrides
+    anticipated, limited = response.anticipated and overrides, response.limited and overrides
     step.lane_change_refused = step.lane_change_refused or episode.refused
     episode.refused = False
-    step.frames += 1
-    step.overridden += overridden
-    step.anticipated += anticipated and overrides
-    step.limited += limited
-    episode.frames_anticipated += anticipated and overrides
-    episode.frames_limited += limited
-    step.dangerous_pairs += pairs
-    step.broken_duties += broken
-    step.response |= danger.response
-    episode.dangerous_pairs += pairs
-    episode.broken_duties += broken
-    episode.frames += 1
-    episode.frames_overridden += overridden
-    episode.min_ttc = min(episode.min_ttc, danger.ttc)
-
-
-@inner
-def _count_change(episode, step, acceleration, steering):
-    """Take the sizes of what was changed on one frame into the tally [m/s^2], [rad]."""
-    step.acceleration_change = max(step.acceleration_change, acceleration)
-    step.steering_change = max(step.steering_change, steering)
-    step.acceleration_changed += acceleration
-    step.steering_changed += steering
-    episode.acceleration_changed += acceleration
-    episode.steering_changed += steering
+    count_frame(step, episode, overridden, anticipated, limited, pairs, broken, danger.response, danger.ttc)
 
 
 @inner
@@ -317,13 +276,6 @@ def start_ride(ride):
         ride.bin[quantity] = ride.above[quantity] = 0
         for b in range(ride.counts.shape[1]):
             ride.counts[quantity, b] = 0
-
-
-@part
-def report_comfort(ride, step):
-    """Fill in how the ride has felt so far."""
-    for k, value in enumerate(comfort_of(ride)):
-        step.comfort[k] = value
 
 
 # ---------------------------------------------------------------- lane changes
@@ -479,14 +431,11 @@ def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
         measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf)
     for a in range(count):
         i = sight.some[a]
-        verdict, axes = _verdict(i, cars, episode, sight, distances, plans, settings)
-        weight = _weight(verdict.verdict)
+        verdict = _verdict(i, cars, episode, sight, distances, plans, settings)
+        weight = weight_of(verdict.verdict)
         if weight > heaviest:
             heaviest = weight
-            episode.blame, episode.blame_partner = 1 + verdict.verdict, car_of(i, episode)
-            episode.blame_axes, episode.blame_frames = axes, verdict.frames
-            episode.ego_duty, episode.ego_excess = verdict.ego_duty, verdict.ego_excess
-            episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
+            enter_contact(episode, verdict, car_of(i, episode), plans is not None)
 
 
 @part
@@ -509,32 +458,18 @@ def _list_partners(cars, episode, sight, dt):
 
 @rare
 def _verdict(i, cars, episode, sight, distances, plans, settings):
-    """Who is to blame for the contact with road user `i`, and where the danger came from, as in `infos`."""
+    """Who is to blame for the contact with road user `i`."""
     ego, other, rules, dt = settings.ego, settings.other, settings.rules, settings.dt
     if plans is not None:
         scene = _scene(cars, episode, sight, plans, settings, True)
         outside = is_outside(scene.paths, scene.threats, i, sight.on_road[i])
         verdict = judge_crossing(sight.samples[i], plans.crossings[i], outside, other, dt)
-        axes = verdict.axes + _PLANS
     if distances is not None:
         past = distances.past
         memory, me = past.memory[i], past.ego[episode.turn]
         catch_up(memory, past.ego[row_before(episode)], sight.users_before[i], ego, other, rules, dt)
         verdict = judge_contact(me, sight.users[i], memory, ego, other, rules, dt)
-        axes = verdict.axes
-    return verdict, axes
-
-
-@part
-def _weight(verdict):
-    """Of several contacts at once, the one that weighs most against the ego counts."""
-    if verdict == NOBODY:
-        return 4
-    if verdict == EGO:
-        return 3
-    if verdict == BOTH:
-        return 2
-    return 1 if verdict == OTHER else 0
+    return verdict
 
 
 @part
@@ -544,9 +479,3 @@ def _touches(cars, k, ego, sight, dt):
         return False
     touches, will_touch, _, _ = overlap(first, second, sight.corners, dt)
     return touches or will_touch
-
-
-@inner
-def is_at_fault(blame):
-    """Does a blame code charge the ego?"""
-    return blame == 1 + EGO or blame == 1 + BOTH

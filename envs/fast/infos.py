@@ -8,22 +8,7 @@ import numpy as np
 
 from rss_shield.envs.fast.config import EXIT, INTERSECTION, Scenario
 from rss_shield.envs.options import Settings
-from rss_shield.shield.comfort import Comfort
-from rss_shield.shield.definitions.response import AXES
-from rss_shield.shield.junctions.plans import PLAN_NAMES
-from rss_shield.shield.lanes.controller import response_name
-from rss_shield.shield.lanes.judge import DUTIES, VERDICTS
-
-
-def _names(texts) -> np.ndarray:
-    """As objects: arrays of characters, each as long as the longest name, would be copied for every environment."""
-    return np.array(list(texts), object)
-
-
-_BLAMES = _names(["", *VERDICTS])
-_DUTIES = _names(DUTIES)
-_RESPONSES = _names(response_name(sum_of_bits) for sum_of_bits in range(16))
-_AXES = _names([*(AXES[axes] for axes in range(len(AXES))), *(PLAN_NAMES[kind] for kind in range(len(PLAN_NAMES)))])
+from rss_shield.shield.tally import shield_infos
 
 
 def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None) -> dict:
@@ -51,67 +36,10 @@ def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None)
     if kind == EXIT or (kind == INTERSECTION and settings is not None):  # a bare intersection does not say it
         infos["is_success"] = steps["success"]
     if settings is not None:
-        infos |= _shield_infos(steps, settings)
+        infos |= shield_infos(steps, settings.dt) | {"time": steps["time"], "raw_reward": steps["raw_reward"]}
     return infos
 
 
 def _of_one_agent(values: np.ndarray) -> np.ndarray:
     """As tuples with one value each, which is what highway-env says of its agents."""
     return np.fromiter(zip(values.tolist(), strict=True), object, len(values))
-
-
-def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
-    frames = np.maximum(steps["frames"], 1)
-    blame = _BLAMES[steps["blame"]]
-    return {
-        "shield": {
-            "intervened": steps["overridden"] > 0,
-            "override_fraction": steps["overridden"] / frames,
-            "anticipation_fraction": steps["anticipated"] / frames,
-            "limited_fraction": steps["limited"] / frames,
-            "acceleration_change": steps["acceleration_change"],
-            "steering_change": steps["steering_change"],
-            "mean_acceleration_change": steps["acceleration_changed"] / frames,
-            "mean_steering_change": steps["steering_changed"] / frames,
-            "lane_change_refused": steps["lane_change_refused"],
-            "dangerous": steps["dangerous_pairs"] > 0,
-            "dangerous_pairs": steps["dangerous_pairs"],
-            "broken_duties": steps["broken_duties"],
-            "min_margin_lon": steps["margin_lon"],
-            "min_margin_lat": steps["margin_lat"],
-            "partner": steps["partner"],
-            "response": _RESPONSES[steps["response"]],
-        },
-        "time": steps["time"],
-        "cost": steps["cost"],
-        "blame": blame,
-        "blame_evidence": {
-            "verdict": blame,
-            "partner": steps["blame_partner"],
-            "danger": _AXES[steps["blame_axes"]],
-            "seconds_since_threshold": steps["blame_frames"] * settings.dt,
-            "ego_duty": _DUTIES[steps["ego_duty"]],
-            "ego_excess": steps["ego_excess"],
-            "other_duty": _DUTIES[steps["other_duty"]],
-            "other_excess": steps["other_excess"],
-        },
-        "override_share": steps["override_share"],
-        "anticipation_share": steps["anticipation_share"],
-        "limited_share": steps["limited_share"],
-        "mean_acceleration_change": steps["mean_acceleration_change"],
-        "mean_steering_change": steps["mean_steering_change"],
-        "episode_cost": steps["episode_cost"],
-        "episode_dangerous_pairs": steps["episode_dangerous_pairs"],
-        "episode_broken_duties": steps["episode_broken_duties"],
-        "min_ttc": steps["min_ttc"],
-        **{name: steps["comfort"][:, k] for k, name in enumerate(Comfort._fields)},
-        "raw_reward": steps["raw_reward"],
-    }
-
-
-def info_of(infos: dict, e: int) -> dict:
-    """Infos of one environment out of those of a batch, as plain Python values."""
-    info = {key: info_of(values, e) if isinstance(values, dict) else values.item(e) for key, values in infos.items()}
-    if info.get("blame") == "":
-        info["blame_evidence"] = {}
-    return info

@@ -10,9 +10,10 @@ from gymnasium.vector.utils import batch_space
 from rss_shield.envs.arguments import seed_of, whole
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
-from rss_shield.envs.fast.infos import info_of, step_infos
+from rss_shield.envs.fast.infos import step_infos
 from rss_shield.envs.fast.recording import Recording
 from rss_shield.envs.options import Settings
+from rss_shield.shield.tally import info_at
 
 _MODES = {
     AutoresetMode.SAME_STEP: SAME_STEP,
@@ -130,7 +131,7 @@ class FastVectorEnv(VectorEnv):
 
     def info(self, e: int) -> dict:
         """The last infos of one environment as a plain dictionary."""
-        info = info_of(self._infos, e)
+        info = info_at(self._infos, e)
         return info if self._decided[e] else _without(info, _OF_DECISIONS)
 
     def close_extras(self, **kwargs) -> None:

@@ -147,4 +147,4 @@ def take_turns(road: Any) -> None:
 def shield_of(vehicle: Any) -> TurnTaker | None:
     """The shield on a vehicle that takes its turn, until it has a contact."""
     shield = getattr(vars(vehicle).get("act"), "__self__", None)
-    return shield if isinstance(shield, TurnTaker) and shield.contact is None else None
+    return shield if isinstance(shield, TurnTaker) and not shield.has_contact else None

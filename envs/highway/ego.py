@@ -6,12 +6,11 @@ import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
 from highway_env.vehicle.objects import Landmark
 
-from rss_shield.envs.options import LANES, Settings
+from rss_shield.envs.options import LANES, PLANS, Settings
 from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, road_through, tightest
 from rss_shield.envs.roads.steering import MAX_SLIP
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
-from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
 from rss_shield.shield.lanes.controller import (
     Body,
@@ -20,22 +19,21 @@ from rss_shield.shield.lanes.controller import (
     respond,
 )
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
-from rss_shield.shield.lanes.judge import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
+from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
-
-# of a car that had its contact before there was a shield on it
-EARLIER_CONTACT = {
-    "verdict": "inherited",
-    "partner": -1,
-    "danger": "inherited",
-    "seconds_since_threshold": 0.0,
-    "ego_duty": "",
-    "ego_excess": 0.0,
-    "other_duty": "",
-    "other_excess": 0.0,
-}
+from rss_shield.shield.tally import (
+    COUNTED,
+    DECISION_FIELDS,
+    EPISODE_FIELDS,
+    count_change,
+    count_frame,
+    enter_contact,
+    start_decision,
+    start_episode,
+)
+from rss_shield.shield.verdicts import INHERITED, KEPT, VERDICTS, Verdict, weight_of
 
 
 class Frame(NamedTuple):
@@ -78,18 +76,8 @@ def log_of(frames: list[Frame]) -> Log:
 # ---------------------------------------------------------------- one ego under the shield
 
 
-class StepTally:
-    """What happened in one decision step, frame by frame."""
-
-    def __init__(self) -> None:
-        self.frames = self.overridden = self.anticipated = self.limited = 0
-        self.dangerous_pairs = self.broken_duties = 0
-        self.acceleration_change = self.steering_change = 0.0  # largest
-        self.acceleration_changed = self.steering_changed = 0.0  # sums over the frames
-        self.lane_change_refused = False
-        self.margin_lon = self.margin_lat = float("inf")
-        self.partner = -1
-        self.response = 0
+# what is counted of one ego, see `shield.tally`
+DECISION, EPISODE = np.dtype(DECISION_FIELDS, align=True), np.dtype(EPISODE_FIELDS, align=True)
 
 
 class ShieldedEgo:
@@ -123,15 +111,11 @@ class ShieldedEgo:
         self.road = np.zeros((0, PIECE_FIELDS))  # that the ego is measured along
         self.branches = self.road  # and everybody else
         self.jumped = np.zeros(0, bool)
-        self.contact: dict | None = None
-        self.frames = self.frames_overridden = self.frames_anticipated = self.frames_limited = 0
-        self.acceleration_changed = self.steering_changed = 0.0
         self.rooms = (float("inf"), float("inf"))  # to the left and to the right, beside who is alongside [m]
         self.ride = np.zeros(1, RIDE)[0]
-        self.dangerous_pairs = self.broken_duties = 0
-        self.cost = 0.0
-        self.min_ttc = float("inf")
-        self.tally = StepTally()
+        self.tally, self.since = np.zeros(1, DECISION)[0], np.zeros(1, EPISODE)[0]  # this decision, and since reset
+        start_decision(self.tally)
+        start_episode(self.since)
         self.record: list[Frame] | None = [] if record else None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
         self.judge = self  # or another, which watches by a table of its own
@@ -139,9 +123,8 @@ class ShieldedEgo:
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
         """Take the place of another car: what counts since reset goes on."""
-        self.frames, self.frames_overridden = former.frames, former.frames_overridden
-        self.dangerous_pairs, self.broken_duties = former.dangerous_pairs, former.broken_duties
-        self.cost, self.min_ttc = former.cost, former.min_ttc
+        for name in COUNTED:
+            self.since[name] = former.since[name]
         if self.judge is not self:
             self.judge.go_on_from(former.judge)
 
@@ -193,48 +176,23 @@ class ShieldedEgo:
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
         before, self.last = self.last, (ego, users)
-        changes = command.acceleration - wish.acceleration, steered - steering
-        self._count(danger, response, response.anticipated, pairs, broken, *changes)
+        count_change(
+            self.tally, self.since, abs(command.acceleration - wish.acceleration), abs(float(steered - steering))
+        )
+        self._count(danger, response, pairs, broken)
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.dt)
         tally = self.tally
-        if max(danger.margin_lon, danger.margin_lat) < max(tally.margin_lon, tally.margin_lat):
-            tally.margin_lon, tally.margin_lat = danger.margin_lon, danger.margin_lat
-            tally.partner = self._index_on_road(danger.partner)
+        if max(danger.margin_lon, danger.margin_lat) < max(tally["margin_lon"], tally["margin_lat"]):
+            tally["margin_lon"], tally["margin_lat"] = danger.margin_lon, danger.margin_lat
+            tally["partner"] = self._index_on_road(danger.partner)
         if self.record is not None:
             seen = ego, users, bend.curvature, tuple(self.jumped), *before
             self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
 
-    def _count(
-        self,
-        danger,
-        response,
-        anticipated: bool,
-        pairs: int,
-        broken: int,
-        acceleration_change: float,
-        steering_change: float,
-    ) -> None:
-        tally, overrides = self.tally, self.settings.overrides
-        tally.frames += 1
-        tally.overridden += response.overridden and overrides
-        tally.anticipated += anticipated and overrides
-        tally.limited += response.limited and overrides
-        tally.dangerous_pairs += pairs
-        tally.broken_duties += broken
-        tally.acceleration_change = max(tally.acceleration_change, abs(acceleration_change))
-        tally.steering_change = max(tally.steering_change, abs(float(steering_change)))
-        tally.acceleration_changed += abs(acceleration_change)
-        tally.steering_changed += abs(float(steering_change))
-        tally.response |= danger.response
-        self.frames += 1
-        self.frames_overridden += response.overridden and overrides
-        self.frames_anticipated += anticipated and overrides
-        self.frames_limited += response.limited and overrides
-        self.acceleration_changed += abs(acceleration_change)
-        self.steering_changed += abs(float(steering_change))
-        self.dangerous_pairs += pairs
-        self.broken_duties += broken
-        self.min_ttc = min(self.min_ttc, danger.ttc)
+    def _count(self, danger, response, pairs: int, broken: int) -> None:
+        on = self.settings.overrides
+        what = response.overridden and on, response.anticipated and on, response.limited and on
+        count_frame(self.tally, self.since, *what, pairs, broken, danger.response, danger.ttc)
 
     def _index_on_road(self, i: int) -> int:
         """Index in `road.vehicles`; static objects follow after the vehicles."""
@@ -251,7 +209,7 @@ class ShieldedEgo:
     def _refuse_lane_change(self, before) -> None:
         """Ignore the lane change that the agent asks for, if it is blocked or comes half-way through another."""
         vehicle = self.vehicle
-        if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.contact is not None:
+        if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.has_contact:
             return
         target = vehicle.target_lane_index
         if target == before or target[:2] != before[:2]:
@@ -259,7 +217,7 @@ class ShieldedEgo:
         back = turns_back(self._offset(vehicle.lane_index), self._offset(before), target[2] - before[2])
         if back or self._is_blocked(target):
             vehicle.target_lane_index = before
-            self.tally.lane_change_refused = True
+            self.tally["lane_change_refused"] = True
 
     def _is_blocked(self, index) -> bool:
         """Is the way to the centre of a lane blocked?"""
@@ -278,13 +236,13 @@ class ShieldedEgo:
             width = vehicle.lane.width_at(0.0)
             slip = lead_back(wish.slip, ego, width, *self.rooms, body.half_wheelbase, body.curvature, self.settings.dt)
             if slip != wish.slip:
-                self.tally.lane_change_refused = True
+                self.tally["lane_change_refused"] = True
             return Command(wish.acceleration, float(slip))
         if isinstance(vehicle, MDPVehicle):
             target = self._reachable(vehicle.lane_index, vehicle.target_lane_index)
             if target != vehicle.target_lane_index:
                 vehicle.target_lane_index = target
-                self.tally.lane_change_refused = True
+                self.tally["lane_change_refused"] = True
         return wish
 
     def _reachable(self, here, target):
@@ -435,39 +393,43 @@ class ShieldedEgo:
 
     # -- contacts
 
+    @property
+    def has_contact(self) -> bool:
+        return bool(self.since["blame"])
+
+    @property
+    def blame(self) -> str:
+        """The verdict of the ego's contact, "" before one."""
+        return VERDICTS[self.since["blame"] - 1] if self.has_contact else ""
+
+    def had_contact_before(self) -> None:
+        """The vehicle had its contact before there was a shield on it."""
+        nobody = Verdict(INHERITED, 0, 0, KEPT, 0.0, KEPT, 0.0)
+        enter_contact(self.since, nobody, -1, False)
+
     def check_contact(self) -> bool:
         """Has the ego touched somebody, or does highway-env predict it for the next frame?
 
         Judged at the first such sample, before the impact displaces anybody.
         """
         vehicle = self.vehicle
-        if self.contact is None and (vehicle.crashed or vehicle.impact is not None):
-            self.contact = self._judge_contact()
+        if not self.has_contact and (vehicle.crashed or vehicle.impact is not None):
+            self._judge_contact()
             if self.judge is not self:
                 self.judge.check_contact()
-        return self.contact is not None
+        return self.has_contact
 
-    def _judge_contact(self) -> dict | None:
+    def _judge_contact(self) -> None:
         self._meet()
         if not self.others:  # the flag was not raised by a contact
-            return None
+            return
         touching = [i for i, other in enumerate(self.others) if self._touches(other)]
         if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
-        verdicts = self._verdicts(touching)
         # several at once: the one that weighs most against the ego counts
-        weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
-        i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: weight[VERDICTS[pair[1].verdict]])
-        return {
-            "verdict": VERDICTS[verdict.verdict],
-            "partner": self._index_on_road(i),
-            "danger": self._danger(i, int(verdict.axes)),
-            "seconds_since_threshold": verdict.frames * self.settings.dt,
-            "ego_duty": DUTIES[verdict.ego_duty],
-            "ego_excess": float(verdict.ego_excess),
-            "other_duty": DUTIES[verdict.other_duty],
-            "other_excess": float(verdict.other_excess),
-        }
+        pairs = zip(touching, self._verdicts(touching), strict=True)
+        i, verdict = max(pairs, key=lambda pair: weight_of(pair[1].verdict))
+        enter_contact(self.since, verdict, self._index_on_road(i), self.settings.scheme == PLANS)
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:
         settings, memory = self.settings, self.memory
@@ -476,9 +438,6 @@ class ShieldedEgo:
         for i in touching:
             catch_up(memory[i], self.last[0], self.last[1][i], *rules)
         return [judge_contact(ego, users[i], memory[i], *rules) for i in touching]
-
-    def _danger(self, i: int, kind: int) -> str:
-        return AXES[kind]
 
     def _touches(self, other) -> bool:
         """highway-env's own collision test, in its own order, without its effects."""

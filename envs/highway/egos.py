@@ -7,7 +7,7 @@ import gymnasium as gym
 
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
-from rss_shield.envs.highway.ego import EARLIER_CONTACT, ShieldedEgo
+from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.risk import RiskMeter, check_risk
 from rss_shield.envs.highway.step import attach, shield_on
 from rss_shield.envs.options import Options, Settings, check_mode, settings_for
@@ -107,7 +107,8 @@ class EgoShields(gym.Wrapper):
             shield.is_ego = True
             shield.meter = RiskMeter(self.risk) if self.risk is not None else None
             if vehicle.crashed:
-                shield.contact = shield.judge.contact = dict(EARLIER_CONTACT)
+                shield.had_contact_before()
+                shield.judge.had_contact_before()
             if env.time > 0.0 and i < len(self._egos):
                 shield.go_on_from(self._egos[i])
         elif shield.settings != self._settings:

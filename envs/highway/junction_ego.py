@@ -24,8 +24,9 @@ from rss_shield.shield.junctions.controller import (
     junction_frame,
 )
 from rss_shield.shield.junctions.held_back import held_by
-from rss_shield.shield.junctions.plans import NEVER, PLAN_NAMES, THREAT, Scene
-from rss_shield.shield.lanes.judge import Verdict
+from rss_shield.shield.junctions.plans import NEVER, THREAT, Scene
+from rss_shield.shield.tally import count_change
+from rss_shield.shield.verdicts import Verdict
 
 
 class JunctionEgo(ShieldedEgo):
@@ -65,19 +66,18 @@ class JunctionEgo(ShieldedEgo):
         granted = report.acceleration if settings.overrides else acceleration
         if settings.overrides:
             vehicle.action = {"steering": steered, "acceleration": granted}
-        if settings.overrides and report.overridden and self.tally.partner < 0:
+        if settings.overrides and report.overridden and self.tally["partner"] < 0:
             held = int(held_by(scene, acceleration, len(self.others), not settings.waits_anywhere))
-            self.tally.partner = self._index_on_road(held) if held >= 0 else -1
+            self.tally["partner"] = self._index_on_road(held) if held >= 0 else -1
         if self.refused:
             report = report._replace(overridden=True, limited=False)
             self.refused = False
-            self.tally.lane_change_refused = True
+            self.tally["lane_change_refused"] = True
         self.frames_trapped += report.trapped
         self.pairs_examined += report.examined
         self.pairs_possible += report.possible
-        self._count(
-            report, report, report.anticipated, report.pairs, report.broken, granted - acceleration, steered - steering
-        )
+        count_change(self.tally, self.since, abs(granted - acceleration), abs(float(steered - steering)))
+        self._count(report, report, report.pairs, report.broken)
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.dt)
         if self.record is not None:
             command = Command(granted, float(np.arctan(0.5 * np.tan(steered))))
@@ -126,7 +126,7 @@ class JunctionEgo(ShieldedEgo):
         super().act(action)
         if action is not None:
             self.refused = False
-            if self.settings.overrides and self.contact is None:
+            if self.settings.overrides and not self.has_contact:
                 self._gate(before)
 
     def _gate(self, before) -> None:
@@ -247,6 +247,3 @@ class JunctionEgo(ShieldedEgo):
             judge_crossing(self.samples[i], self.crossings[i], out, other, dt)
             for i, out in zip(touching, outside, strict=True)
         ]
-
-    def _danger(self, i: int, kind: int) -> str:
-        return PLAN_NAMES[kind]

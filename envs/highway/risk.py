@@ -6,7 +6,6 @@ import numpy as np
 from highway_env.road.lane import LineType
 
 from rss_shield.envs.highway.ego import ShieldedEgo
-from rss_shield.envs.highway.step import LONGEST_TTC
 from rss_shield.envs.options import LANES
 from rss_shield.shield.geometry import make_road
 from rss_shield.shield.lanes.frame import to_lane_frame_all
@@ -23,6 +22,7 @@ from rss_shield.shield.risk import (
 )
 from rss_shield.shield.risk.field import check_speeds
 from rss_shield.shield.risk.markings import weight_of
+from rss_shield.shield.tally import LONGEST_TTC
 
 CAR = 1500.0  # mass of everybody [kg]: highway-env's vehicles have none
 

@@ -171,5 +171,4 @@ def traffic_info(wrapper) -> dict[str, Any]:
     """What infos say about compliant traffic."""
     if wrapper.options.traffic == "stock":
         return {}
-    contacts = [driver.contact for driver in wrapper.drivers if driver.check_contact()]
-    return {"traffic_blame": tuple(contact["verdict"] for contact in contacts)}
+    return {"traffic_blame": tuple(driver.blame for driver in wrapper.drivers if driver.check_contact())}

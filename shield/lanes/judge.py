@@ -34,32 +34,19 @@ from rss_shield.shield.lanes.memory import (
     slowest_in_danger,
 )
 from rss_shield.shield.lanes.pair import assess, head_on_braking, is_following, sampled_approach
-
-KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
-# at junctions; who is TRAPPED has no plan left toward anybody because a third broke its duty
-LEFT_NO_PLAN, WAVERED, ACCELERATED, BRAKED, LEFT_PATHS, CRASHED, GAVE_NO_WAY, REVERSED, CUT_IN, TRAPPED = range(7, 17)
-DUTIES = (
-    "",
-    "got farther along the lane than its share [m]",
-    "stopped shorter than braking at a_max_brake would [m]",
-    "came closer across the lane than its share [m]",
-    "braked less than the proper response asks [m/s^2]",
-    "braked harder than a_max_brake [m/s^2]",
-    "moved toward the other across the lane [m/s]",
-    "left itself no way to stay clear [m/s^2]",
-    "neither braked nor went on [m/s^2]",
-    "accelerated harder than a_max_accel [m/s^2]",
-    "braked harder than a_max_brake at a junction [m/s^2]",
-    "left every path it could take",
-    "crashed before",
-    "did not give way",
-    "reversed [m/s]",
-    "cut in in front of the other",
-    "none: somebody else had trapped the ego",
+from rss_shield.shield.verdicts import (
+    KEPT,
+    NOBODY,
+    REVERSED,
+    TOO_CLOSE,
+    TOO_FAR,
+    TOO_HARD,
+    TOO_SHORT,
+    TOO_WEAK,
+    TOWARD,
+    judged,
+    who_broke,
 )
-NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
-VERDICTS = ("none", "ego", "other", "both", "inherited")
-AT_FAULT = ("ego", "both")  # verdicts that charge the ego
 
 _NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
@@ -246,18 +233,6 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
     return pairs, broken
 
 
-class Verdict(NamedTuple):
-    """Who is to blame for a contact, with the evidence."""
-
-    verdict: int  # index into VERDICTS
-    axes: int  # axes safe at the threshold: kind of danger (`response.NEVER | LON | LAT`)
-    frames: int  # from the threshold to the contact
-    ego_duty: int  # first duty broken, index into DUTIES
-    ego_excess: float
-    other_duty: int
-    other_excess: float
-
-
 @apart
 def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     """Verdict at the first contact of the ego with one road user (Def. 27).
@@ -277,24 +252,8 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
         judge_motion(memory, ego, user, ego_params, other_params, _NOW, 0.0, dt)
         # the simulator predicts contacts one frame ahead
         judge_motion(memory, ego, user, ego_params, other_params, _NEXT_FRAME, rules.overlap_margin, dt)
-    ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
-    if memory.since == 0:
-        verdict = NOBODY
-    elif memory.axes == NEVER:
-        verdict = EGO if ego_broke else INHERITED
-    elif ego_broke:
-        verdict = BOTH if other_broke else EGO
-    else:
-        verdict = OTHER if other_broke else NOBODY
-    return Verdict(
-        verdict,
-        memory.axes,
-        memory.since,
-        memory.ego_broke,
-        memory.ego_excess,
-        memory.other_broke,
-        memory.other_excess,
-    )
+    never_safe = memory.axes == NEVER
+    return judged(NOBODY if memory.since == 0 else who_broke(memory, never_safe), memory.axes, memory)
 
 
 class Log(NamedTuple):

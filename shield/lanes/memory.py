@@ -58,7 +58,7 @@ MEMORY = np.dtype(
         ("side_now", "f8"),  # 0 = squarely ahead or behind
         ("side_for", "i8"),
         ("w_side", "f8"),  # speed of the ego toward that side when this came about [m/s]
-        # first duty that each broke since t_b (`blame.DUTIES`) and the most it was broken by
+        # first duty that each broke since t_b (`verdicts.DUTIES`) and the most it was broken by
         ("ego_broke", "i8"),
         ("ego_excess", "f8"),
         ("other_broke", "i8"),

@@ -13,7 +13,7 @@ from highway_env.vehicle.objects import Obstacle
 from rss_shield import PRESETS, Rules
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
-from rss_shield.shield.lanes.judge import VERDICTS
+from rss_shield.shield.verdicts import VERDICTS
 
 DT = 1 / 15
 TABLE = PRESETS["simulator"]
@@ -118,7 +118,7 @@ def test_an_ego_that_has_stopped_behind_something_parked_gets_past(lanes, lane, 
     assert stopped - ego.vehicle.position[0] > 55.0
     ask(ego, 3.0, 600, to)
     assert ego.vehicle.position[0] > front + 5.0
-    assert ego.contact is None and ego.broken_duties == 0
+    assert not ego.has_contact and ego.since["broken_duties"] == 0
 
 
 @pytest.mark.parametrize("gap", [0.3, 0.9, 2.0, 3.3, 4.5, 9.0])
@@ -128,7 +128,7 @@ def test_it_stops_before_whoever_stands_behind_it(gap):
     parked(road, 92.5 - gap, 0)
     ask(ego, -5.0, 300)
     left = ego.vehicle.position[0] - 2.5 - 97.5 + gap
-    assert ego.contact is None and ego.broken_duties == 0
+    assert not ego.has_contact and ego.since["broken_duties"] == 0
     # it may start at any time, and then needs 2.4 m to stop behind a standing ego at 1 m
     assert left == pytest.approx(gap) if gap < 3.4 else 3.4 < left < 3.9
 
@@ -171,8 +171,8 @@ def test_an_unshielded_ego_that_backs_into_somebody_is_to_blame(gap, verdict):
     ego = shielded(road, overrides=False)
     parked(road, 92.5 - gap, 0)
     ask(ego, -5.0, 300)
-    assert ego.contact is not None and ego.contact["verdict"] == verdict
-    assert ego.broken_duties > 0
+    assert ego.blame == verdict
+    assert ego.since["broken_duties"] > 0
 
 
 @pytest.mark.parametrize("speed", [4.0, 8.0, 20.0])
@@ -183,5 +183,5 @@ def test_who_drives_into_an_ego_that_backs_up_where_it_may_is_to_blame(speed):
     assert ego.vehicle.speed == -Rules().reverse_speed
     road.vehicles.append(Vehicle(road, [-150.0, 0.0], 0.0, speed))
     ask(ego, -5.0, 900)
-    assert ego.contact is not None and ego.contact["verdict"] == "other"
-    assert ego.broken_duties == 0
+    assert ego.blame == "other"
+    assert ego.since["broken_duties"] == 0

@@ -70,10 +70,11 @@ from rss_shield.shield.definitions.unstructured import (
     trajectory,
 )
 from rss_shield.shield.geometry import half_extents, locate, make_road
-from rss_shield.shield.lanes.judge import VERDICTS, judge_contact, judge_frame
+from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.memory import MEMORY, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.verdicts import VERDICTS
 
 EXAMPLES = json.loads((DATA / "rss-examples.json").read_text())
 

@@ -15,10 +15,11 @@ from rss_shield.shield.geometry import make_road
 from rss_shield.shield.junctions.plans import THREAT, farthest, fastest, nearest
 from rss_shield.shield.lanes.controller import always_on
 from rss_shield.shield.lanes.frame import to_lane_frame
-from rss_shield.shield.lanes.judge import EGO, INHERITED, TOO_WEAK, judge_contact
+from rss_shield.shield.lanes.judge import judge_contact
 from rss_shield.shield.lanes.memory import MEMORY, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, toward
 from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.verdicts import EGO, INHERITED, TOO_WEAK
 
 CAR = PRESETS["simulator"].ego  # accelerates at 3, brakes at 5 to 6 m/s^2; lateral 1 and 1.5; at most 40 m/s
 DT = 0.2
