@@ -16,7 +16,15 @@ LIBRARIES = {
 }
 # part -> parts that it may import, itself left out; a part is a folder, or the modules that lie in it directly
 LAWS = {"shield.definitions", "shield.params", "shield._numba"}
-OWES = {"shield.verdicts", "shield.geometry", "shield.command", "shield.chosen", "shield.anything", "shield.comfort"}
+OWES = {
+    "shield.table",
+    "shield.verdicts",
+    "shield.geometry",
+    "shield.command",
+    "shield.chosen",
+    "shield.anything",
+    "shield.comfort",
+}
 BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions", "shield.tally"}
 ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
 ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}

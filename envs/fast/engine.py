@@ -47,6 +47,7 @@ from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, ra
 from rss_shield.shield.comfort import RIDE
 from rss_shield.shield.junctions.controller import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.table import table_for
 from rss_shield.shield.tally import end_decision, start_decision
 from rss_shield.shield.verdicts import charges_ego
 
@@ -290,7 +291,7 @@ class Engine:
         self.autoreset = autoreset
         self.mode = OFF if settings is None else OVERRIDE if settings.overrides else MONITOR
         self.penalty, self.by_change = float(penalty), bool(by_change)
-        self.settings = settings or Settings(*PRESETS["simulator"][:2], Rules(), False, 1.0)
+        self.settings = settings or Settings(table_for(PRESETS["simulator"], Rules(), 1.0), False)
         network, net = scenario.stock.road.network, scenario.network
         watched = n if settings else 0
         frames = ways = past = crossings = None
@@ -329,7 +330,7 @@ class Engine:
         config = scenario.config[0]
         sizes = len(scenario.network.lanes), n, config["speeds"], config["lanes"], config["times"]
         self._sights = [make_sight(*sizes) for _ in range(threads)]
-        self._watch = make_watch(self.settings.rules.heading_bound)
+        self._watch = make_watch(self.settings.table.rules.heading_bound)
 
     def seed(self, seeds) -> None:
         """Give environments the generators that highway-env would have.

@@ -171,7 +171,7 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, sett
         _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step)
         gap = sight.z[0]
     ego = cars[episode.ego]
-    ride_on(ride, ego.speed, ego.heading, gap, settings.dt)
+    ride_on(ride, ego.speed, ego.heading, gap, settings.table.dt)
 
 
 @inner
@@ -193,10 +193,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         past.ego[row_before(episode)],
         sight.users_before,
         memory,
-        settings.ego,
-        settings.other,
-        settings.rules,
-        settings.dt,
+        settings.table,
         who,
         nearest,
         soonest,
@@ -210,7 +207,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     if settings.overrides:
         body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack, car.kind == DIRECT)
         wanted = _take_back(wish, car, ego, episode, lanes, sight, body, settings, step)
-        response = respond(wanted, danger, ego, body, settings.rules, settings.dt)
+        response = respond(wanted, danger, ego, body, settings.table.rules, settings.table.dt)
         command, steered = response.command, steering
         if command.slip != wish.slip:
             steered = arctan(2.0 * tan(command.slip))
@@ -218,9 +215,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         count_change(step, episode, abs(command.acceleration - acceleration), abs(steered - steering))
     pairs = broken = 0
     if danger.dangerous:
-        pairs, broken = judge_frame(
-            ego, users, memory, response.command, bend.curvature, settings.ego, settings.other, settings.dt, who
-        )
+        pairs, broken = judge_frame(ego, users, memory, response.command, bend.curvature, settings.table, who)
     _count(episode, step, danger, response, pairs, broken, settings.overrides)
     if danger.partner >= 0:
         step.margin_lon, step.margin_lat = danger.margin_lon, danger.margin_lat
@@ -242,7 +237,7 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
         not settings.waits_anywhere,
         settings.examine,
         settings.overrides,
-        settings.rules.anticipation,
+        settings.table.rules.anticipation,
     )
     if settings.overrides:
         if report.overridden and step.partner < 0:
@@ -297,7 +292,7 @@ def refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, se
 @part
 def _refuse_blocked(before, cars, episode, lanes, sight, settings, step):
     ego = cars[episode.ego]
-    if not settings.overrides or not settings.rules.take_back or episode.blame != 0 or ego.kind != META:
+    if not settings.overrides or not settings.table.rules.take_back or episode.blame != 0 or ego.kind != META:
         return
     k = ego.target_lane
     if k == before or lanes[k].road != lanes[before].road:
@@ -318,11 +313,11 @@ def _is_blocked(k, episode, sight):
 def _take_back(wish, car, ego, episode, lanes, sight, body, settings, step):
     """`envs.highway.ego.ShieldedEgo._taken_back`: what the agent wants, and the lane that it heads for from now on."""
     slip = wish.slip
-    if settings.rules.take_back and car.kind == DIRECT:
+    if settings.table.rules.take_back and car.kind == DIRECT:
         rooms = episode.room_left, episode.room_right
         width = lanes[car.lane].width
-        slip = lead_back(slip, ego, width, *rooms, body.half_wheelbase, body.curvature, settings.dt)
-    if settings.rules.take_back and car.kind == META:
+        slip = lead_back(slip, ego, width, *rooms, body.half_wheelbase, body.curvature, settings.table.dt)
+    if settings.table.rules.take_back and car.kind == META:
         lane = _reachable(car.lane, car.target_lane, episode, lanes, sight)
         step.lane_change_refused = step.lane_change_refused or lane != car.target_lane
         car.target_lane = lane
@@ -384,7 +379,7 @@ def _scene(cars, episode, sight, plans, settings, judging):
         sight.on_road[:n],
         plans.crossings[:n],
         settings.intent,
-        settings.other.v_cap,
+        settings.table.other.v_cap,
         sight.samples,
         sight.threats,
         sight.box,
@@ -393,7 +388,9 @@ def _scene(cars, episode, sight, plans, settings, judging):
         episode.overflow = True
     count = min(count, len(sight.threats))
     drift = drift_of(roads, sight.on_road[n], track)
-    return Scene(roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, drift)
+    return Scene(
+        roads.paths, track, sight.threats[:count], settings.table.ego, settings.table.other, settings.table.dt, drift
+    )
 
 
 @inner
@@ -423,7 +420,7 @@ def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings
 
 @rare
 def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
-    count, heaviest = _list_partners(cars, episode, sight, settings.dt), -1
+    count, heaviest = _list_partners(cars, episode, sight, settings.table.dt), -1
     if distances is not None:
         episode.near, past = count, distances.past
         for a in range(count):
@@ -459,16 +456,16 @@ def _list_partners(cars, episode, sight, dt):
 @rare
 def _verdict(i, cars, episode, sight, distances, plans, settings):
     """Who is to blame for the contact with road user `i`."""
-    ego, other, rules, dt = settings.ego, settings.other, settings.rules, settings.dt
+    table = settings.table
     if plans is not None:
         scene = _scene(cars, episode, sight, plans, settings, True)
         outside = is_outside(scene.paths, scene.threats, i, sight.on_road[i])
-        verdict = judge_crossing(sight.samples[i], plans.crossings[i], outside, other, dt)
+        verdict = judge_crossing(sight.samples[i], plans.crossings[i], outside, table.other, table.dt)
     if distances is not None:
         past = distances.past
         memory, me = past.memory[i], past.ego[episode.turn]
-        catch_up(memory, past.ego[row_before(episode)], sight.users_before[i], ego, other, rules, dt)
-        verdict = judge_contact(me, sight.users[i], memory, ego, other, rules, dt)
+        catch_up(memory, past.ego[row_before(episode)], sight.users_before[i], table)
+        verdict = judge_contact(me, sight.users[i], memory, table)
     return verdict
 
 

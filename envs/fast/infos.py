@@ -36,7 +36,7 @@ def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None)
     if kind == EXIT or (kind == INTERSECTION and settings is not None):  # a bare intersection does not say it
         infos["is_success"] = steps["success"]
     if settings is not None:
-        infos |= shield_infos(steps, settings.dt) | {"time": steps["time"], "raw_reward": steps["raw_reward"]}
+        infos |= shield_infos(steps, settings.table.dt) | {"time": steps["time"], "raw_reward": steps["raw_reward"]}
     return infos
 
 

@@ -157,17 +157,16 @@ class ShieldedEgo:
         self._meet()
         users, ego, bend = self._sense()
         wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
-        rules = settings.ego, settings.other, settings.rules, settings.dt
-        danger = find_danger(ego, users, *self.last, self.memory, *rules)
+        danger = find_danger(ego, users, *self.last, self.memory, settings.table)
         self.rooms = danger.room_left, danger.room_right
         response = Response(wish, False, False, False)
         if settings.overrides:
             body = Body(*self.body, bend.curvature, bend.slack, self.backs_up)
-            response = respond(self._taken_back(wish, ego, body), danger, ego, body, settings.rules, settings.dt)
+            response = respond(
+                self._taken_back(wish, ego, body), danger, ego, body, settings.table.rules, settings.table.dt
+            )
         command = response.command
-        pairs, broken = judge_frame(
-            ego, users, self.memory, command, bend.curvature, settings.ego, settings.other, settings.dt
-        )
+        pairs, broken = judge_frame(ego, users, self.memory, command, bend.curvature, settings.table)
         steered = steering
         if command != wish:
             if command.slip != wish.slip:
@@ -180,7 +179,7 @@ class ShieldedEgo:
             self.tally, self.since, abs(command.acceleration - wish.acceleration), abs(float(steered - steering))
         )
         self._count(danger, response, pairs, broken)
-        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.dt)
+        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.table.dt)
         tally = self.tally
         if max(danger.margin_lon, danger.margin_lat) < max(tally["margin_lon"], tally["margin_lat"]):
             tally["margin_lon"], tally["margin_lat"] = danger.margin_lon, danger.margin_lat
@@ -204,7 +203,7 @@ class ShieldedEgo:
 
     @property
     def _takes_back(self) -> bool:
-        return self.settings.overrides and self.settings.rules.take_back and self.settings.scheme == LANES
+        return self.settings.overrides and self.settings.table.rules.take_back and self.settings.scheme == LANES
 
     def _refuse_lane_change(self, before) -> None:
         """Ignore the lane change that the agent asks for, if it is blocked or comes half-way through another."""
@@ -234,7 +233,9 @@ class ShieldedEgo:
             return wish
         if not isinstance(vehicle, ControlledVehicle):
             width = vehicle.lane.width_at(0.0)
-            slip = lead_back(wish.slip, ego, width, *self.rooms, body.half_wheelbase, body.curvature, self.settings.dt)
+            slip = lead_back(
+                wish.slip, ego, width, *self.rooms, body.half_wheelbase, body.curvature, self.settings.table.dt
+            )
             if slip != wish.slip:
                 self.tally["lane_change_refused"] = True
             return Command(wish.acceleration, float(slip))
@@ -270,7 +271,7 @@ class ShieldedEgo:
         self._choose_frame()
         users, ego = self._measure(self.poses, self.before)
         self._go_around(users, ego)
-        (x, y, _, speed), dt = self.poses[-1], self.settings.dt
+        (x, y, _, speed), dt = self.poses[-1], self.settings.table.dt
         bend = look_ahead(self.road, x, y, speed, self.body[0], dt)
         self.poses_before, self.earlier, self.before = self.poses, self.before, self.poses[:, :2]
         return users, ego, Bend(*bend)
@@ -280,7 +281,7 @@ class ShieldedEgo:
         out = np.zeros(len(poses), ROAD_USER)
         out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in self.others]
         out["in_own_lane"] = [self._in_own_lane(v) for v in [*self.others, self.vehicle]]
-        dt = self.settings.dt
+        dt = self.settings.table.dt
         to_lane_frame_all(self.branches, poses[:-1], before[:-1], self.boxes[:-1], dt, out[:-1])
         to_lane_frame_all(self.road, poses[-1:], before[-1:], self.boxes[-1:], dt, out[-1:])
         return out[:-1], out[-1]
@@ -292,7 +293,6 @@ class ShieldedEgo:
         in again from there.
         """
         settings = self.settings
-        rules = settings.ego, settings.other, settings.rules, settings.dt
         ego_before, users_before = self.last[0], self.last[1].copy()
         for i in np.flatnonzero(np.isfinite(users["around"])):
             around = users["around"][i]
@@ -304,7 +304,7 @@ class ShieldedEgo:
             if self.memory["since"][i] == 0:
                 margins = []
                 for users["s"][i] in places:
-                    margins.append(assess(ego, users[i], *rules).margin_lon)
+                    margins.append(assess(ego, users[i], settings.table).margin_lon)
                 place = int(np.argmin(margins))
             users["s"][i] = places[place]
             if place != follows and known:
@@ -345,7 +345,7 @@ class ShieldedEgo:
         self.others, self.memory, self.keys = others, memory, keys
         self.poses_before, self.before, self.earlier = poses, before, earlier
         self.last = (self.last[0], last)
-        bound, bend = self.settings.rules.heading_bound, tightest(self.vehicle.road.network)
+        bound, bend = self.settings.table.rules.heading_bound, tightest(self.vehicle.road.network)
         self.boxes = np.array([_box(v, bound, bend) for v in [*others, self.vehicle]])
 
     def _choose_frame(self) -> None:
@@ -379,7 +379,7 @@ class ShieldedEgo:
     def _roads_along(self, heading: Heading):
         """The road that the ego is measured along, and the one with the branches that it may still take."""
         settings, network = self.settings, self.vehicle.road.network
-        reach = reach_of(settings.ego, settings.other, settings.dt)
+        reach = reach_of(settings.table.ego, settings.table.other, settings.table.dt)
         road = road_through(network, heading.lane, reach, heading.way)
         return road, road_through(network, heading.lane, reach, *heading[1:]) if heading.beside else road
 
@@ -433,11 +433,10 @@ class ShieldedEgo:
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:
         settings, memory = self.settings, self.memory
-        rules = settings.ego, settings.other, settings.rules, settings.dt
         users, ego, _ = self._sense()
         for i in touching:
-            catch_up(memory[i], self.last[0], self.last[1][i], *rules)
-        return [judge_contact(ego, users[i], memory[i], *rules) for i in touching]
+            catch_up(memory[i], self.last[0], self.last[1][i], settings.table)
+        return [judge_contact(ego, users[i], memory[i], settings.table) for i in touching]
 
     def _touches(self, other) -> bool:
         """highway-env's own collision test, in its own order, without its effects."""
@@ -448,7 +447,7 @@ class ShieldedEgo:
             first, second = other, vehicle
         if not (first.check_collisions or second.check_collisions):
             return False
-        touching, will_touch, _ = first._is_colliding(second, self.settings.dt)
+        touching, will_touch, _ = first._is_colliding(second, self.settings.table.dt)
         return bool(touching or will_touch)
 
 

@@ -82,7 +82,7 @@ class EgoShields(gym.Wrapper):
         """
         self._check()
         env: Any = self.env.unwrapped
-        if self._settings.dt != 1 / env.config["simulation_frequency"]:
+        if self._settings.table.dt != 1 / env.config["simulation_frequency"]:
             self._settings, self._judge = self._current_settings(), self._judge_settings()
         self._egos = [self._shield_of(i, vehicle) for i, vehicle in enumerate(env.controlled_vehicles)]
         for shield in list(egos_on(env)):

@@ -53,7 +53,7 @@ class JunctionEgo(ShieldedEgo):
         self.judging = False  # a contact: who had crashed is read off the frame before
 
     def _take_sizes(self, sizes: tuple[Size, ...]) -> None:
-        self.junction = junction_of(self.vehicle.road.network, self.clearance, self.settings.dt, sizes)
+        self.junction = junction_of(self.vehicle.road.network, self.clearance, self.settings.table.dt, sizes)
 
     def _frame(self) -> None:
         vehicle, settings = self.vehicle, self.settings
@@ -78,7 +78,7 @@ class JunctionEgo(ShieldedEgo):
         self.pairs_possible += report.possible
         count_change(self.tally, self.since, abs(granted - acceleration), abs(float(steered - steering)))
         self._count(report, report, report.pairs, report.broken)
-        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.dt)
+        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.table.dt)
         if self.record is not None:
             command = Command(granted, float(np.arctan(0.5 * np.tan(steered))))
             self.record.append(Frame(tuple(self.keys), self.poses, command))
@@ -93,7 +93,7 @@ class JunctionEgo(ShieldedEgo):
 
     def _scene_of(self, track, threats, roads) -> Scene:
         settings, drift = self.settings, drift_of(roads, self.cars[-1], track)
-        return Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt, drift)
+        return Scene(roads.paths, track, threats, settings.table.ego, settings.table.other, settings.table.dt, drift)
 
     def _restrict(
         self, scene: Scene, acceleration: float, steering: float, holds: bool = False
@@ -116,7 +116,7 @@ class JunctionEgo(ShieldedEgo):
             not settings.waits_anywhere,
             settings.examine,
             settings.overrides,
-            settings.rules.anticipation,
+            settings.table.rules.anticipation,
             holds,
         )
         return report, steering
@@ -163,7 +163,7 @@ class JunctionEgo(ShieldedEgo):
         track = track_of(roads, cars[-1], self.path)
         self.path = track.path
         self.samples = np.zeros(len(self.others), SAMPLE)
-        common = (roads, track, cars[:-1], self.crossings, settings.intent, settings.other.v_cap, self.samples)
+        common = (roads, track, cars[:-1], self.crossings, settings.intent, settings.table.other.v_cap, self.samples)
         count = list_threats(*common, self.room, self.box)
         if count > len(self.room):
             self.room = np.zeros(2 * count, THREAT)
@@ -180,7 +180,7 @@ class JunctionEgo(ShieldedEgo):
         approach, distance = road.approach_of(vehicle), road.distance_to_line(vehicle)
         if approach < 0:
             return threats
-        ahead = road.signal(approach), distance, max(vehicle.speed, 0.0), self.settings.ego
+        ahead = road.signal(approach), distance, max(vehicle.speed, 0.0), self.settings.table.ego
         if self.may_pass is None:
             self.may_pass = bool(may_pass(*ahead))
         elif distance > 0.0:
@@ -214,7 +214,7 @@ class JunctionEgo(ShieldedEgo):
             threat["priority"] = 0
         if has_right or road.has_left(other):
             return
-        if left > 0.0 and stopping_distance(other.speed, settings.other.a_min_brake) <= left:
+        if left > 0.0 and stopping_distance(other.speed, settings.table.other.a_min_brake) <= left:
             if settings.entry != CAUTIOUS:
                 threat["line"] = threat["s"] + left
                 threat["red_for"] = road.time_to_green(road.approach_of(other))
@@ -241,7 +241,7 @@ class JunctionEgo(ShieldedEgo):
         self.judging = True
         _, threats, roads = self._look()
         self.judging = False
-        other, dt = self.settings.other, self.settings.dt
+        other, dt = self.settings.table.other, self.settings.table.dt
         outside = [is_outside(roads.paths, threats, i, self.cars[i]) for i in touching]
         return [
             judge_crossing(self.samples[i], self.crossings[i], out, other, dt)

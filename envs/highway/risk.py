@@ -77,7 +77,7 @@ class RiskMeter:
 
     def look(self, ego: ShieldedEgo) -> None:
         """Take in one frame."""
-        self.dt = ego.settings.dt
+        self.dt = ego.settings.table.dt
         sources = _sources(ego.poses, self.settings)
         along_lanes = ego.settings.scheme == LANES
         body, users = ego.last if along_lanes else _straight_ahead(ego)
@@ -156,7 +156,7 @@ def _straight_ahead(ego: ShieldedEgo) -> tuple[np.ndarray, np.ndarray]:
     users = np.zeros(len(ego.poses), ROAD_USER)
     x, y, heading, _ = ego.poses[-1]
     road = make_road([(x, y, heading, 0.0, 1.0, 0.0)])
-    to_lane_frame_all(road, ego.poses, np.full((len(users), 2), np.nan), ego.boxes, ego.settings.dt, users)
+    to_lane_frame_all(road, ego.poses, np.full((len(users), 2), np.nan), ego.boxes, ego.settings.table.dt, users)
     return users[-1], users[:-1]
 
 

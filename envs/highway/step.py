@@ -79,7 +79,7 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
         end_decision(judge.tally, judge.since, judge.ride, cost)
         for name in JUDGED:
             step[name] = judge.tally[name]
-    info = info_at(shield_infos(step, ego.settings.dt), 0)
+    info = info_at(shield_infos(step, ego.settings.table.dt), 0)
     return info | (ego.meter.info() if ego.meter is not None else {})
 
 
@@ -125,4 +125,4 @@ def audit_of(ego: ShieldedEgo) -> Audit:
             "audit: expected an environment without junctions; where roads cross, infos count the pair-frames: "
             "episode_dangerous_pairs, episode_broken_duties"
         )
-    return audit(log_of(frames), settings.ego, settings.other, settings.rules, settings.dt)
+    return audit(log_of(frames), settings.table)

@@ -71,18 +71,18 @@ def _blame_other(memory, duty, excess):
 
 
 @compiled
-def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
+def judge_motion(memory, ego, user, table, ahead, slack):
     """Hold what each has used of the distance at the threshold against its share, on a dangerous sample.
 
     Args:
       memory: `MEMORY` record after this sample, since > 0; the verdict so far is kept in it.
       ego, user: `ROAD_USER` records.
-      ego_params, other_params: `RSSParams`.
+      table: `Table` in force.
       ahead: frames to extrapolate along the headings: 0, or 1 where contact is predicted.
       slack: how far the ego's heading may overshoot its share in that extrapolation [m]; it lags
         behind the lateral speed, and `overlap_margin` is there for it.
-      dt: length of a frame [s].
     """
+    dt = table.dt
     step = ahead * dt
     if owes(memory, LON):
         travel_ego = memory.travel_ego + ego.speed * ego.cos * step
@@ -93,19 +93,19 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
         tau = (memory.since - (memory.axes == NEVER) + ahead) * dt
         if not is_following(memory.v_ego, memory.v_other, memory.opposite):
             sign = 1.0 if memory.ego_is_rear else -1.0
-            b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, ego_params, other_params)
-            share = _share_toward(sign * memory.v_ego, ego_params, b_ego, dt)
+            b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, table.ego, table.other)
+            share = _share_toward(sign * memory.v_ego, table.ego, b_ego, dt)
             _blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
-            share = _share_toward(-sign * memory.v_other, other_params, b_other, dt)
+            share = _share_toward(-sign * memory.v_other, table.other, b_other, dt)
             _blame_other(memory, TOO_FAR, -sign * travel_other + longer_other - share)
         elif memory.ego_is_rear:
-            _blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, ego_params, dt))
-            share = _share_front(tau, memory.v_other, other_params, dt)
+            _blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, table.ego, dt))
+            share = _share_front(tau, memory.v_other, table.other, dt)
             _blame_other(memory, TOO_SHORT, share - travel_other + longer_other)
         else:
-            share = _share_front(tau, memory.v_ego, ego_params, dt) - memory.way_back
+            share = _share_front(tau, memory.v_ego, table.ego, dt) - memory.way_back
             _blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
-            share = _share_rear(tau, memory.v_other, other_params, dt)
+            share = _share_rear(tau, memory.v_other, table.other, dt)
             _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
         if ahead == 0 and memory.age > 1 and not user.wreck:
             duty, excess = _audit_acceleration(
@@ -113,18 +113,18 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
                 tau - dt,
                 memory.speed_other - memory.acceleration_other * dt,
                 memory.acceleration_other,
-                other_params,
+                table.other,
                 dt,
             )
             _blame_other(memory, duty, excess)
     if owes(memory, LAT):
         used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * step
-        share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
+        share = approach_no_credit(memory.w_ego, table.ego) + lateral_euler_margin(memory.w_ego, table.ego, dt)
         _blame_ego(memory, TOO_CLOSE, used - share - slack)
         used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * step
         # a driver may already use the first frame's growth on it; mu has room for that
-        first_frame = other_params.a_lat_max_accel * dt**2
-        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt) - first_frame)
+        first_frame = table.other.a_lat_max_accel * dt**2
+        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, table.other, dt) - first_frame)
 
 
 @inner
@@ -207,26 +207,26 @@ def _audit_acceleration(role, tau, v, a, params, dt):
 
 
 @apart
-def judge_frame(ego, users, memory, command, curvature, ego_params, other_params, dt, who=None):
+def judge_frame(ego, users, memory, command, curvature, table, who=None):
     """Judge one frame of all pairs after `find_danger` has updated their memory.
 
     Args:
       ego, users, memory: as in `find_danger`; the verdict so far is kept in `memory`.
       command: `Command` that the ego executes on this frame.
       curvature: of the lane under the ego, see `shield.lanes.frame.Bend` [1/m].
-      ego_params, other_params, dt: as in `find_danger`.
+      table: as in `find_danger`.
       who: as in `find_danger`; nobody else may be in danger.
 
     Returns:
       (pairs, broken): dangerous pairs on this frame, and those whose duty the ego broke on it.
     """
-    drift = 0.5 * curvature * ego.speed**2 * dt
+    drift = 0.5 * curvature * ego.speed**2 * table.dt
     pairs = broken = 0
     for a in range(how_many(who, users)):
         i = which(who, a)
         if memory[i].since > 0:
-            judge_motion(memory[i], ego, users[i], ego_params, other_params, _NOW, 0.0, dt)
-            duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
+            judge_motion(memory[i], ego, users[i], table, _NOW, 0.0)
+            duty, excess = audit_command(memory[i], ego, command, drift, table.ego, table.dt)
             _blame_ego(memory[i], duty, excess)
             pairs += 1
             broken += duty != KEPT
@@ -234,7 +234,7 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
 
 
 @apart
-def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
+def judge_contact(ego, user, memory, table):
     """Verdict at the first contact of the ego with one road user (Def. 27).
 
     Args:
@@ -246,12 +246,12 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
       `Verdict`. "inherited": never safe since first sight and the ego responded properly all the
       time. "none" must not happen: a margin is missing.
     """
-    pair = assess(ego, user, ego_params, other_params, rules, dt)
-    remember(memory, pair, ego, user, dt)
+    pair = assess(ego, user, table)
+    remember(memory, pair, ego, user, table.dt)
     if memory.since > 0:
-        judge_motion(memory, ego, user, ego_params, other_params, _NOW, 0.0, dt)
+        judge_motion(memory, ego, user, table, _NOW, 0.0)
         # the simulator predicts contacts one frame ahead
-        judge_motion(memory, ego, user, ego_params, other_params, _NEXT_FRAME, rules.overlap_margin, dt)
+        judge_motion(memory, ego, user, table, _NEXT_FRAME, table.rules.overlap_margin)
     never_safe = memory.axes == NEVER
     return judged(NOBODY if memory.since == 0 else who_broke(memory, never_safe), memory.axes, memory)
 
@@ -279,18 +279,17 @@ class Audit(NamedTuple):
 
 
 @compiled_for_arrays
-def audit(log, ego_params, other_params, rules, dt):
+def audit(log, table):
     """Replay a log and say for every dangerous pair-frame whether the ego kept its duty (Defs. 4, 8, 10).
 
     Args:
       log: `Log`.
-      ego_params, other_params: `RSSParams`, response times in whole frames.
-      rules: `Rules` in force.
-      dt: length of a frame [s].
+      table: `Table` in force.
 
     Returns:
       `Audit`.
     """
+    dt = table.dt
     frames, count = log.present.shape
     dangerous = np.zeros((frames, count), np.bool_)
     duty = np.zeros((frames, count), np.int64)
@@ -305,10 +304,10 @@ def audit(log, ego_params, other_params, rules, dt):
                 continue
             if log.jumped[t, i]:
                 forget_safe(memory[i])
-            catch_up(memory[i], log.ego_before[t], log.users_before[t, i], ego_params, other_params, rules, dt)
-            pair = assess(ego, log.users[t, i], ego_params, other_params, rules, dt)
+            catch_up(memory[i], log.ego_before[t], log.users_before[t, i], table)
+            pair = assess(ego, log.users[t, i], table)
             remember(memory[i], pair, ego, log.users[t, i], dt)
             if memory[i].since > 0:
                 dangerous[t, i] = True
-                duty[t, i], excess[t, i] = audit_command(memory[i], ego, command, drift, ego_params, dt)
+                duty[t, i], excess[t, i] = audit_command(memory[i], ego, command, drift, table.ego, dt)
     return Audit(dangerous, duty, excess)

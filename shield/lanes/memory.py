@@ -125,15 +125,15 @@ def _note_situation(memory, pair, narrower, other_in_own_lane):
 
 
 @compiled
-def catch_up(memory, ego_before, user_before, ego_params, other_params, rules, dt):
+def catch_up(memory, ego_before, user_before, table):
     """Take in the last sample, if it was skipped, in place. It is the threshold of a danger that begins now."""
     if memory.skipped:
-        _take_in(memory, ego_before, user_before, ego_params, other_params, rules, dt)
+        _take_in(memory, ego_before, user_before, table)
 
 
 @rare
-def _take_in(memory, ego, user, ego_params, other_params, rules, dt):
-    remember(memory, assess(ego, user, ego_params, other_params, rules, dt), ego, user, dt)
+def _take_in(memory, ego, user, table):
+    remember(memory, assess(ego, user, table), ego, user, table.dt)
 
 
 @compiled

@@ -13,6 +13,7 @@ from highway_env.vehicle.objects import Obstacle
 from rss_shield import PRESETS, Rules
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
+from rss_shield.shield.params import Table
 from rss_shield.shield.verdicts import VERDICTS
 
 DT = 1 / 15
@@ -31,8 +32,8 @@ def test_among_the_lawful_an_ego_that_backs_up_is_touched_by_nobody(others, dt, 
     assert (episodes["contact"] == -1).all()
     assert episodes["broken"].sum() == 0, "the ego broke a duty"
     assert (episodes["backed_up"] > 0).mean() > 0.3
-    assert 1.4 < episodes["fastest_back"].max() <= w.table.reverse_speed + 1e-9
-    assert episodes["heading"].max() <= 1.25 * np.arcsin(w.table.heading_bound)
+    assert 1.4 < episodes["fastest_back"].max() <= w.published.reverse_speed + 1e-9
+    assert episodes["heading"].max() <= 1.25 * np.arcsin(w.published.heading_bound)
 
 
 @pytest.mark.parametrize("dt", [1 / 15, 1 / 5])
@@ -58,7 +59,7 @@ def straight_road(lanes):
 def shielded(road, lane=0, speed=0.0, overrides=True, kind=Vehicle, **options):
     vehicle = kind(road, [100.0, 4.0 * lane], 0.0, speed, **options)
     road.vehicles.append(vehicle)
-    return ShieldedEgo(vehicle, Settings(TABLE.ego, TABLE.other, Rules(), overrides, DT))
+    return ShieldedEgo(vehicle, Settings(Table(TABLE.ego, TABLE.other, Rules(), DT), overrides))
 
 
 def parked(road, x, lane, length=5.0):

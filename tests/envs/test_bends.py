@@ -16,6 +16,7 @@ from rss_shield.shield.geometry import locate
 from rss_shield.shield.lanes.controller import Body, always_on, restrict
 from rss_shield.shield.lanes.frame import Bend, look_ahead, to_lane_frame
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.params import Table
 
 TABLE = PRESETS["simulator"]
 BOX = np.array([5.0, 2.0, 2.5, 1.0])
@@ -178,7 +179,7 @@ def meet(kind, radius, turn, pieces, lane, gap, speed, faster=0.0, overrides=Tru
     other = kind(road, theirs.position(at + gap, 0), theirs.heading_at(at + gap), speed + faster)
     road.vehicles += [vehicle, other]
     other.ego = vehicle
-    settings = Settings(TABLE.ego, TABLE.other, Rules(), overrides, 1 / 15)
+    settings = Settings(Table(TABLE.ego, TABLE.other, Rules(), 1 / 15), overrides)
     shield = ShieldedEgo(vehicle, settings, record=True)
     for _ in range(180):
         road.act()

@@ -13,6 +13,7 @@ from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import road_through
 from rss_shield.shield.definitions.response import LAT, LON
 from rss_shield.shield.geometry import locate
+from rss_shield.shield.params import Table
 
 DT = 1 / 15
 TABLE = PRESETS["simulator"]
@@ -25,7 +26,7 @@ def straight_road(lanes=2):
 def shielded(road, x=0.0, lane=0, speed=25.0, overrides=True, rules=Rules(anticipation=0.0, take_back=False)):
     vehicle = MDPVehicle(road, [x, 4.0 * lane], heading=0.0, speed=speed)
     road.vehicles.append(vehicle)
-    return ShieldedEgo(vehicle, Settings(TABLE.ego, TABLE.other, rules, overrides, DT), record=True)
+    return ShieldedEgo(vehicle, Settings(Table(TABLE.ego, TABLE.other, rules, DT), overrides), record=True)
 
 
 def drive(road, frames):

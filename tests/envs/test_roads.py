@@ -14,6 +14,7 @@ from rss_shield.envs.roads.lanes import heading_of, reach_of, road_through
 from rss_shield.envs.worlds.random_roads import Element, Pose, advance, lane_beside
 from rss_shield.shield.definitions.response import NEVER
 from rss_shield.shield.geometry import AROUND, locate, nearest_piece
+from rss_shield.shield.params import Table
 
 DT = 1 / 15
 TABLE = PRESETS["simulator"]
@@ -62,7 +63,7 @@ def put(road, index, s, speed, kind=Vehicle, **options):
 
 
 def shield_on(vehicle, overrides=True, rules=Rules()):
-    return ShieldedEgo(vehicle, Settings(TABLE.ego, TABLE.other, rules, overrides, DT), record=True)
+    return ShieldedEgo(vehicle, Settings(Table(TABLE.ego, TABLE.other, rules, DT), overrides), record=True)
 
 
 def drive(road, ego, frames):

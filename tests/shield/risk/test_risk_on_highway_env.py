@@ -109,7 +109,7 @@ def test_infos_sum_up_the_frames_of_the_episode(env_id):
             assert info["risk"]["total"] == max(frame.total for frame in step)
             assert info["risk"]["thw"] == min(frame.thw for frame in step)
         times, rdsi, lower, upper, states = np.array(env.risk_frames)[:, :5].T
-        dt = env.settings.dt
+        dt = env.settings.table.dt
         assert np.diff(times) == pytest.approx(dt)
         assert info["max_rdsi"] == max(frame.largest for frame in env.risk_frames) >= rdsi.max() > 0.0
         assert info["max_total_rdsi"] == max(frame.total for frame in env.risk_frames)
