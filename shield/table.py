@@ -1,7 +1,7 @@
 """The table that a shield and a judge go by, for frames of a given length."""
 
-from rss_shield.shield.definitions.kinematics import frames_for
 from rss_shield.shield.params import Preset, Rules, Table
+from rss_shield.shield.sampling import frames_for
 
 
 def table_for(params: Preset, rules: Rules, dt: float) -> Table:

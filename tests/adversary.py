@@ -12,7 +12,6 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled_for_arrays as compiled
 from rss_shield.shield.command import Command
-from rss_shield.shield.definitions.kinematics import frames_for
 from rss_shield.shield.definitions.response import LAT, LON
 from rss_shield.shield.geometry import half_extents, largest_half_extents
 from rss_shield.shield.lanes.controller import Body, always_on, find_danger, respond, restrict
@@ -20,6 +19,7 @@ from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.memory import MEMORY, merge, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.params import PRESETS, RSSParams, Rules, Table
+from rss_shield.shield.sampling import frames_for
 
 HALF_WHEELBASE = 2.5  # [m]
 MAX_SLIP = float(np.arctan(np.tan(np.pi / 3) / 2))  # of highway-env's steering [rad]

@@ -17,6 +17,7 @@ LIBRARIES = {
 # part -> parts that it may import, itself left out; a part is a folder, or the modules that lie in it directly
 LAWS = {"shield.definitions", "shield.params", "shield._numba"}
 OWES = {
+    "shield.sampling",
     "shield.table",
     "shield.verdicts",
     "shield.geometry",

@@ -13,7 +13,7 @@ from highway_env.road.lane import CircularLane, SineLane, StraightLane
 from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from rss_shield.shield.definitions.longitudinal import d_min_longitudinal, euler_margin
+from rss_shield.shield.definitions.longitudinal import d_min_longitudinal
 from rss_shield.shield.geometry import (
     AFTER,
     AROUND,
@@ -27,6 +27,7 @@ from rss_shield.shield.geometry import (
     wrap_angle,
 )
 from rss_shield.shield.params import RSSParams
+from rss_shield.shield.sampling import euler_margin
 
 LaneIndex = tuple[str, str, int]
 Way = tuple[tuple[str, str], ...]  # roads one after the other: node where each starts, node where it ends

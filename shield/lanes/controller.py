@@ -8,8 +8,7 @@ from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.chosen import how_many, which
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import time_to_collision
-from rss_shield.shield.definitions.lateral import d_min_no_credit, lateral_euler_margin
-from rss_shield.shield.definitions.longitudinal import reach_from_rest
+from rss_shield.shield.definitions.lateral import d_min_no_credit
 from rss_shield.shield.geometry import signed_gap
 from rss_shield.shield.lanes.anticipation import acceleration_cap, farthest_bound, lateral_cap
 from rss_shield.shield.lanes.frame import beyond
@@ -23,7 +22,6 @@ from rss_shield.shield.lanes.memory import (
     owes_lateral_stop,
     owes_no_approach,
     remember,
-    slowest_in_danger,
 )
 from rss_shield.shield.lanes.pair import (
     STANDSTILL,
@@ -33,9 +31,9 @@ from rss_shield.shield.lanes.pair import (
     least_cosine,
     least_margin,
     own_share,
-    sampling_margin,
     toward,
 )
+from rss_shield.shield.sampling import lateral_euler_margin, reach_from_rest, sampling_margin, slowest_in_danger
 
 
 class Danger(NamedTuple):

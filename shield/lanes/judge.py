@@ -20,20 +20,11 @@ from rss_shield.shield._numba.compiled import apart, compiled, compiled_for_arra
 from rss_shield.shield.chosen import how_many, which
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import forward_reach, speed_envelope, travel
-from rss_shield.shield.definitions.lateral import approach_no_credit, lateral_euler_margin
-from rss_shield.shield.definitions.longitudinal import euler_margin
+from rss_shield.shield.definitions.lateral import approach_no_credit
 from rss_shield.shield.definitions.response import FRONT, LAT, LON, NEVER, lateral_speed_limit, longitudinal_response
-from rss_shield.shield.lanes.memory import (
-    MEMORY,
-    catch_up,
-    forget_safe,
-    owes,
-    remember,
-    role_of_ego,
-    role_of_other,
-    slowest_in_danger,
-)
-from rss_shield.shield.lanes.pair import assess, head_on_braking, is_following, sampled_approach
+from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, owes, remember, role_of_ego, role_of_other
+from rss_shield.shield.lanes.pair import assess, head_on_braking, is_following
+from rss_shield.shield.sampling import euler_margin, lateral_euler_margin, sampled_approach, slowest_in_danger
 from rss_shield.shield.verdicts import (
     KEPT,
     NOBODY,

@@ -208,12 +208,6 @@ def may_back_up(memory, pair):
     return not pair.hems_in or (pair.safe_lat and not pair.safe_lon)
 
 
-@compiled
-def slowest_in_danger(v, params, dt):
-    """Least speed after a frame of a car that may not back up, negative while it still rolls back [m/s]."""
-    return min(v + params.a_min_brake * dt, 0.0)
-
-
 # ---------------------------------------------------------------- merge over all neighbours: Def. 10
 
 

@@ -6,19 +6,10 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.definitions.kinematics import reach, stopping_distance
-from rss_shield.shield.definitions.lateral import (
-    approach_no_credit,
-    d_min_no_credit,
-    d_min_of_pair,
-    lateral_euler_margin,
-)
-from rss_shield.shield.definitions.longitudinal import (
-    d_min_longitudinal,
-    euler_margin,
-    is_safe_longitudinally,
-    reach_from_rest,
-)
+from rss_shield.shield.definitions.lateral import d_min_no_credit, d_min_of_pair
+from rss_shield.shield.definitions.longitudinal import d_min_longitudinal, is_safe_longitudinally
 from rss_shield.shield.geometry import signed_gap
+from rss_shield.shield.sampling import euler_margin, lateral_euler_margin, reach_from_rest, sampling_margin
 
 # One road user in the lane frame of the ego. SI units; lateral values positive to the right.
 ROAD_USER = np.dtype(
@@ -200,19 +191,6 @@ def slowed(v, cos, wreck, least_cos):
     """`leading_speed` of a user that drives at `v` [m/s]; `cos`, `wreck` as in `ROAD_USER`."""
     v = v * min(cos, least_cos)
     return min(v, 0.0) if wreck else v
-
-
-@compiled
-def sampled_approach(w, car, dt):
-    """Farthest a compliant car may come, sampled every `dt`, from speed `w` toward its neighbour [m]."""
-    w = max(w, 0.0)
-    return approach_no_credit(w, car) + sampling_margin(w, car, dt)
-
-
-@compiled
-def sampling_margin(w, car, dt):
-    """What sampling every `dt` adds to that, w >= 0 [m]."""
-    return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8
 
 
 @inner

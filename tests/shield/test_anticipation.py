@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from adversary import play, world
 
-from rss_shield.shield.definitions.kinematics import frames_for
 from rss_shield.shield.lanes.anticipation import (
     ROOM,
     acceleration_cap,
@@ -17,6 +16,7 @@ from rss_shield.shield.lanes.controller import find_danger
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.params import PRESETS, Rules, Table
+from rss_shield.shield.sampling import frames_for
 
 DTS = (1 / 30, 1 / 20, 1 / 15, 1 / 10, 1 / 5)
 ROUND = PRESETS["slides"].ego._replace(  # numbers to reckon with by hand

@@ -20,7 +20,6 @@ from rss_shield.shield.definitions.longitudinal import (
     d_min_longitudinal,
     d_min_opposite_direction,
     d_min_same_direction,
-    euler_margin,
     is_safe_longitudinally,
 )
 from rss_shield.shield.definitions.occlusion import is_exonerated_by_mean_speed, mean_speed_until_contact, v_visible
@@ -74,6 +73,7 @@ from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.memory import MEMORY, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.params import PRESETS, Rules, Table
+from rss_shield.shield.sampling import euler_margin
 from rss_shield.shield.verdicts import VERDICTS
 
 EXAMPLES = json.loads((DATA / "rss-examples.json").read_text())
