@@ -4,6 +4,8 @@ Arrays of numbers are views of the engine's records; nothing is computed for an 
 nobody asks about.
 """
 
+from typing import Any
+
 import numpy as np
 
 from rss_shield.envs.fast.config import EXIT, INTERSECTION, Scenario
@@ -111,7 +113,12 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
 
 def info_of(infos: dict, e: int) -> dict:
     """Infos of one environment out of those of a batch, as plain Python values."""
-    info = {key: info_of(values, e) if isinstance(values, dict) else values.item(e) for key, values in infos.items()}
+    info = {key: info_of(values, e) if isinstance(values, dict) else _one(values, e) for key, values in infos.items()}
     if info.get("blame") == "":
         info["blame_evidence"] = {}
     return info
+
+
+def _one(values: np.ndarray, e: int) -> Any:
+    """Of environment `e`; a continuous action is an array."""
+    return values.item(e) if values.ndim == 1 else values[e]
