@@ -13,7 +13,17 @@ from rss_shield.envs.arguments import rules_of, seed_of, whole
 from rss_shield.envs.fast.config import Unsupported, compile_scenario
 from rss_shield.envs.fast.vector import FastVectorEnv
 from rss_shield.envs.make import make
-from rss_shield.envs.options import MODES, PLANS, Options, Params, Settings, check_environment, settings_for, split
+from rss_shield.envs.options import (
+    MODES,
+    PLANS,
+    Options,
+    Params,
+    Settings,
+    check_environment,
+    check_replace,
+    settings_for,
+    split,
+)
 
 BACKENDS = ("fast", "highway-env")
 
@@ -43,9 +53,9 @@ def make_vec(
       config: as for `gymnasium.make` of a highway-env environment.
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
-      kwargs: `max_episode_steps`; `rules`, `intervention_penalty`, `penalty_on`, `entry`, `intent`, `waiting` and
-        `examine` of `ShieldWrapper`; and whatever else `make` takes (`judge_params`, ...) where the backend is
-        "highway-env".
+      kwargs: `max_episode_steps`; `rules`, `intervention_penalty`, `penalty_on`, `entry`, `intent`, `waiting`,
+        `examine`, `filter`, `filter_at`, `correction` and `replace` of `ShieldWrapper`; and whatever else `make`
+        takes (`judge_params`, ...) where the backend is "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.
@@ -70,7 +80,8 @@ def make_vec(
     scenario = compile_scenario(env_id, config, max_episode_steps=rest.get("max_episode_steps"))
     settings = _settings_in(scenario.stock, shield, options) if shield is not None else None
     penalty, by_change = float(options.intervention_penalty), options.penalty_on == "change"
-    return FastVectorEnv(scenario, num_envs, settings, penalty, autoreset_mode, threads, by_change)
+    replaces = shield is not None and options.replace == "decision"
+    return FastVectorEnv(scenario, num_envs, settings, penalty, autoreset_mode, threads, by_change, replaces)
 
 
 def _check_supported(options: Options, rest: dict[str, Any]) -> None:
@@ -84,6 +95,7 @@ def _check_supported(options: Options, rest: dict[str, Any]) -> None:
 
 def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
     check_environment(stock)
+    check_replace(options, stock)
     settings = settings_for(stock, options.params_in(stock), rules_of(options.rules), shield, options.conduct)
     if settings.scheme == PLANS and not isinstance(stock.action_type, DiscreteMetaAction):
         kind = type(stock.action_type).__name__

@@ -17,9 +17,11 @@ from highway_env.envs.u_turn_env import UTurnEnv
 from rss_shield.envs.arguments import number, preset_of, rules_of
 from rss_shield.envs.stock import LOWEST_FREQUENCY, check_frequencies
 from rss_shield.envs.worlds.signalised import SignalisedIntersectionEnv
+from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
 from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
 from rss_shield.shield.junctions.plans import ANY, INTENTS
+from rss_shield.shield.lanes.correction import CORRECTIONS, NEAREST
 from rss_shield.shield.params import Preset, RSSParams, Rules, Table
 from rss_shield.shield.risk import RiskSettings
 from rss_shield.shield.table import table_for
@@ -29,6 +31,7 @@ MODES = ("override", "monitor")
 WAITING = ("line", "anywhere")
 TRAFFIC = ("stock", "compliant")  # how everybody else drives
 PENALTIES = ("response", "change")  # what an intervention penalty is charged for
+REPLACES = ("frame", "decision")  # what an action that is not permitted is replaced on
 SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
     "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
@@ -51,6 +54,8 @@ class Settings(NamedTuple):
     intent: int = ANY  # which routes it expects of others: index into `shield.junctions.plans.INTENTS`
     waits_anywhere: bool = False  # it may also wait inside a junction, in the way of nobody who is there yet
     examine: int = TABLE  # against whom plans are checked: index into `shield.junctions.examined.EXAMINED`
+    filter: Filter = Filter(RSS)  # what acts in the shield's place
+    correction: int = NEAREST  # what a duty makes of a command: index into `shield.lanes.correction.CORRECTIONS`
 
 
 class Given(TypedDict, total=False):
@@ -66,6 +71,10 @@ class Given(TypedDict, total=False):
     traffic: str
     examine: str
     risk: bool | RiskSettings
+    filter: str
+    filter_at: float | None
+    correction: str
+    replace: str
     judge_params: Params
     judge_rules: Rules | Mapping[str, Any] | None
 
@@ -89,6 +98,10 @@ class Options:
     traffic: str = "stock"
     examine: str = "table"
     risk: bool | RiskSettings = False
+    filter: str = "rss"
+    filter_at: float | None = None
+    correction: str = "nearest"
+    replace: str = "frame"
     judge_params: Params = None
     judge_rules: Rules | Mapping[str, Any] | None = None
 
@@ -101,9 +114,20 @@ class Options:
             ("intent", INTENTS),
             ("waiting", WAITING),
             ("examine", EXAMINED),
+            ("filter", FILTERS),
+            ("correction", CORRECTIONS),
+            ("replace", REPLACES),
         ):
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {', '.join(known)}")
+
+        if self.filter_at is not None:
+            number("filter_at", self.filter_at, 0.01)
+            if FILTERS.index(self.filter) not in THRESHOLDS:
+                able = ", ".join(FILTERS[kind] for kind in THRESHOLDS)
+                raise ValueError(
+                    f"filter_at = {self.filter_at!r} with filter = {self.filter!r}: expected one of {able}"
+                )
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "Options":
@@ -121,13 +145,20 @@ class Options:
 
     @property
     def conduct(self) -> dict[str, Any]:
-        """The fields of `Settings` that say how the ego behaves at junctions."""
+        """The fields of `Settings` that say how the ego behaves at junctions, and what answers in which way."""
         return {
             "entry": ENTRIES.index(self.entry),
             "intent": INTENTS.index(self.intent),
             "waits_anywhere": self.waiting == "anywhere",
             "examine": EXAMINED.index(self.examine),
+            "filter": self._filter,
+            "correction": CORRECTIONS.index(self.correction),
         }
+
+    @property
+    def _filter(self) -> Filter:
+        kind = FILTERS.index(self.filter)
+        return Filter(kind, float(THRESHOLDS.get(kind, 0.0) if self.filter_at is None else self.filter_at))
 
     def params_in(self, env: Any) -> Preset:
         """The table that the egos of an environment are restricted by; see `envs.arguments.preset_of`."""
@@ -201,6 +232,13 @@ def _check_free_driving(action_type: ContinuousAction, env: Any) -> None:
         )
 
 
+def check_replace(options: Options, env: Any) -> None:
+    """Can actions be replaced at the start of a decision, if that is asked for?"""
+    if options.replace == "decision" and not isinstance(env.action_type, DiscreteMetaAction):
+        kind = type(env.action_type).__name__
+        raise ValueError(f"replace = 'decision' with action type {kind}: expected DiscreteMetaAction, or 'frame'")
+
+
 def scheme_of(env: Any) -> int:
     """What keeps the ego safe in an environment: LANES or PLANS."""
     return next(scheme for kind, scheme in _SCHEMES.items() if isinstance(env, kind))
@@ -222,4 +260,17 @@ def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dic
         )
     if scheme == PLANS:  # the paths hold everybody's width at any speed, so lateral speeds need no limit
         rules = rules._replace(limits=False)
+    _check_distances(scheme, conduct)
+    if conduct["filter"].kind != RSS:  # nothing that is the shield's own acts beside another filter
+        rules = rules._replace(take_back=False, anticipation=0.0)
     return Settings(table_for(params, rules, dt), mode == "override", scheme, **conduct)
+
+
+def _check_distances(scheme: int, conduct: dict[str, Any]) -> None:
+    """Some options are about distances along lanes."""
+    for name, index, known in (
+        ("filter", conduct["filter"].kind, FILTERS),
+        ("correction", conduct["correction"], CORRECTIONS),
+    ):
+        if scheme == PLANS and index != 0:
+            raise ValueError(f"{name} = {known[index]!r}: expected {known[0]!r} where roads cross")

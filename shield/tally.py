@@ -36,6 +36,8 @@ DECISION_FIELDS = [
     ("limited", "i8"),  # on which only the always-on limits did
     ("dangerous_pairs", "i8"),
     ("broken_duties", "i8"),
+    ("acceleration", "f8"),  # sums of what was executed [m/s^2]
+    ("steering", "f8"),  # [rad]
     ("acceleration_change", "f8"),  # largest [m/s^2]
     ("steering_change", "f8"),  # [rad]
     ("acceleration_changed", "f8"),  # sums over the frames
@@ -84,6 +86,7 @@ def start_decision(step):
     """Nothing has happened in this decision yet. step: record with the fields `DECISION_FIELDS`."""
     step.frames = step.overridden = step.anticipated = step.limited = 0
     step.dangerous_pairs = step.broken_duties = 0
+    step.acceleration = step.steering = 0.0
     step.acceleration_change = step.steering_change = step.acceleration_changed = step.steering_changed = 0.0
     step.lane_change_refused = False
     step.margin_lon = step.margin_lat = np.inf
@@ -138,6 +141,13 @@ def count_frame(step, episode, overridden, anticipated, limited, pairs, broken, 
     episode.dangerous_pairs += pairs
     episode.broken_duties += broken
     episode.min_ttc = min(episode.min_ttc, ttc)
+
+
+@compiled
+def note_executed(step, acceleration, steering):
+    """Take in what the ego does on one frame [m/s^2], [rad]."""
+    step.acceleration += acceleration
+    step.steering += steering
 
 
 @compiled
@@ -242,7 +252,12 @@ _SINCE_RESET = (
 
 def info_at(infos: dict[str, Any], e: int) -> dict[str, Any]:
     """Infos of one environment out of those of a batch, as plain Python values."""
-    info = {key: info_at(values, e) if isinstance(values, dict) else values.item(e) for key, values in infos.items()}
+    info = {key: info_at(values, e) if isinstance(values, dict) else _one(values, e) for key, values in infos.items()}
     if info.get("blame") == "":
         info["blame_evidence"] = {}
     return info
+
+
+def _one(values: np.ndarray, e: int) -> Any:
+    """Of environment `e`; a continuous action is an array."""
+    return values.item(e) if values.ndim == 1 else values[e]

@@ -38,6 +38,7 @@ SLOW = frozenset(
         "eval/test_learning_curve",
         "eval/test_replay",
         "eval/test_rollout",
+        "fast/test_action_masks",
         "fast/test_adapter",
         "fast/test_floats",
         "fast/test_intersection",

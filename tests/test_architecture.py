@@ -26,7 +26,7 @@ OWES = {
     "shield.anything",
     "shield.comfort",
 }
-BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions", "shield.tally"}
+BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions", "shield.filters", "shield.tally"}
 ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
 ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
 MAY_IMPORT = {
@@ -36,12 +36,14 @@ MAY_IMPORT = {
     "shield.risk": LAWS | OWES,
     "shield.lanes": LAWS | OWES,
     "shield.junctions": LAWS | OWES | {"shield.lanes"},  # a verdict is one on either kind of road
+    "shield.filters": LAWS | OWES | {"shield.lanes"},
     "envs._numpy": {"envs.compiled", "shield._numba"},
     "envs.compiled": {"envs._numpy", "shield._numba"},
     "envs.roads": ROADS | BELOW,
     "envs.worlds": {"envs.stock"} | ROADS | BELOW,
-    "envs.highway": ROADS | ENTRY | BELOW | {"envs.make", "shield.risk"},
-    "envs.fast": ROADS | ENTRY | BELOW,
+    "envs.decisions": ROADS | BELOW,
+    "envs.highway": ROADS | ENTRY | BELOW | {"envs.decisions", "envs.make", "shield.risk"},
+    "envs.fast": ROADS | ENTRY | BELOW | {"envs.decisions"},
 }
 MODULES = [path for package in LIBRARIES for path in sorted((ROOT / package).rglob("*.py"))]
 PARTED = [path for path in MODULES if path.name != "__init__.py" or len(path.relative_to(ROOT).parts) > 2]

@@ -7,15 +7,17 @@ side by side. Environments do not see each other: results do not depend on who a
 import sys
 from collections.abc import Callable
 from threading import Timer
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import typeof
 
 from rss_shield.envs.compiled import kernel, unfolded
+from rss_shield.envs.decisions.foresight import without_anticipation
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.draws import load_generator
 from rss_shield.envs.fast.drivers import take_meta_action
+from rss_shield.envs.fast.foresight import foresee, make_desk
 from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.guard import (
     MONITOR,
@@ -327,10 +329,13 @@ class Engine:
         self._size = int(np.prod(scenario.observation_space.shape or 1))
         self._crew = Crew(threads)
         self._kernel: Callable[..., None] | None = None  # `run`, compiled for this engine
+        self._foresees: Callable[..., None] | None = None  # `foresee`, likewise
         config = scenario.config[0]
         sizes = len(scenario.network.lanes), n, config["speeds"], config["lanes"], config["times"]
         self._sights = [make_sight(*sizes) for _ in range(threads)]
         self._watch = make_watch(self.settings.table.rules.heading_bound)
+        self._calm = without_anticipation(self.settings)
+        self._desks = [make_desk(n, len(scenario.labels)) for _ in range(threads)]
 
     def seed(self, seeds) -> None:
         """Give environments the generators that highway-env would have.
@@ -366,6 +371,19 @@ class Engine:
         actions, commands = np.ascontiguousarray(actions, np.int64), np.ascontiguousarray(commands, np.float64)
         return self._run(Inputs(actions, commands, np.full(e, DECIDE, np.int8)))
 
+    def action_masks(self) -> np.ndarray:
+        """`[E, A]` bool: which meta-actions would pass the coming decision; see `FastVectorEnv.action_masks`."""
+        masks = np.empty((self.num_envs, len(self.scenario.labels)), bool)
+        common = (self.world, self.batch, self._watch, self._calm, masks)
+        if self._foresees is None:
+            self._foresees = _specialise(foresee, self._sights[0], self._desks[0], *common)
+        look = self._foresees
+        self._crew.work(
+            self.num_envs,
+            lambda thread, first, last: look(first, last, self._sights[thread], self._desks[thread], *common),
+        )
+        return masks
+
     def _run(self, inputs: Inputs) -> Outputs:
         e = self.num_envs
         outputs = Outputs(
@@ -380,7 +398,7 @@ class Engine:
         rules = (self.settings, self.mode, self.penalty, self.by_change, self.autoreset)
         common = (self.world, self.batch, inputs, outputs, self.film, self._watch, *rules)
         if self._kernel is None:
-            self._kernel = _specialise(self._sights[0], *common)
+            self._kernel = _specialise(run, self._sights[0], *common)
         advance = self._kernel
         self._crew.work(e, lambda thread, first, last: advance(first, last, self._sights[thread], *common))
         if self.batch.episodes["overflow"].any():
@@ -397,8 +415,8 @@ class Engine:
         self._crew.close()
 
 
-def _specialise(*arguments) -> Callable[..., None]:
-    """`run`, compiled for these arguments or loaded from numba's cache; says so if that takes long.
+def _specialise(entry: Any, *arguments) -> Callable[..., None]:
+    """A kernel, compiled for these arguments or loaded from numba's cache; says so if that takes long.
 
     It skips what numba does on every call to find out the types of its arguments, a hundred arrays.
     """
@@ -408,7 +426,7 @@ def _specialise(*arguments) -> Callable[..., None]:
     notice.start()
     try:
         with compiling_quickly():
-            run(0, 0, *arguments)
+            entry(0, 0, *arguments)
     finally:
         notice.cancel()
-    return run.overloads[tuple(typeof(argument) for argument in (0, 0, *arguments))].entry_point
+    return entry.overloads[tuple(typeof(argument) for argument in (0, 0, *arguments))].entry_point

@@ -28,15 +28,17 @@ from rss_shield.envs.roads.ways import (
 from rss_shield.shield._numba.compiled import inner, part, rare
 from rss_shield.shield.comfort import ride_on
 from rss_shield.shield.command import Command
+from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import largest_half_extents
 from rss_shield.shield.junctions.controller import CROSSING, has_plan, judge_crossing, junction_frame
 from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.plans import Scene
 from rss_shield.shield.lanes.controller import Body, Response, find_danger, respond
+from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up
-from rss_shield.shield.tally import count_change, count_frame, enter_contact, start_episode
+from rss_shield.shield.tally import count_change, count_frame, enter_contact, note_executed, start_episode
 from rss_shield.shield.verdicts import weight_of
 
 OFF, MONITOR, OVERRIDE = range(3)
@@ -127,7 +129,7 @@ def start_watch(episode, distances, plans, ride, watch):
     start_ride(ride)
     episode.room_left = episode.room_right = np.inf
     episode.path, episode.go, episode.frames_trapped = -1, -1, 0
-    episode.held_at, episode.wronged = np.inf, False
+    episode.held_at, episode.wronged, episode.answers = np.inf, False, False
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     start_episode(episode)
@@ -184,7 +186,9 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         acceleration, steering = car.acceleration, car.steering
     # only who is nearer than anybody was before, in this decision or this episode, changes the tally
     nearest, soonest = max(step.margin_lon, step.margin_lat), episode.min_ttc
-    bend = measure(cars, episode, lanes, sight, distances, watch.boxes, settings, False, nearest, soonest)
+    others_act = settings.overrides and settings.filter.kind != RSS
+    everybody = np.inf if others_act else -np.inf  # other filters look farther
+    bend = measure(cars, episode, lanes, sight, distances, watch.boxes, settings, False, nearest, soonest, everybody)
     ego, users, memory = past.ego[episode.turn], sight.users, past.memory
     who = past.near[: episode.near]
     danger = find_danger(
@@ -206,13 +210,19 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     response = Response(wish, False, False, False)
     if settings.overrides:
         body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack, car.kind == DIRECT)
-        wanted = _take_back(wish, car, ego, episode, lanes, sight, body, settings, step)
-        response = respond(wanted, danger, ego, body, settings.table.rules, settings.table.dt)
+        if others_act:
+            response = _answer(wish, car, danger, episode, sight, distances, body, settings, step)
+        else:
+            wanted = _take_back(wish, car, ego, episode, lanes, sight, body, settings, step)
+            response = respond(wanted, danger, ego, body, settings.table.rules, settings.table.dt)
+            if settings.correction == RESPONSE:
+                response = in_full(response, danger, ego, body, settings.table.rules, settings.table.dt)
         command, steered = response.command, steering
         if command.slip != wish.slip:
             steered = arctan(2.0 * tan(command.slip))
         car.acceleration, car.steering = command.acceleration, steered
         count_change(step, episode, abs(command.acceleration - acceleration), abs(steered - steering))
+    note_executed(step, car.acceleration, car.steering)
     pairs = broken = 0
     if danger.dangerous:
         pairs, broken = judge_frame(ego, users, memory, response.command, bend.curvature, settings.table, who)
@@ -222,11 +232,30 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         step.partner = car_of(danger.partner, episode)
 
 
+@part
+def _answer(wish, car, danger, episode, sight, distances, body, settings, step):
+    """What another filter makes of the ego's command."""
+    past, who = distances.past, distances.past.near[: episode.near]
+    offset = 0.0 if car.kind == DIRECT else sight.lateral[car.target_lane, episode.ego]
+    traffic = Traffic(past.ego[episode.turn], sight.users, past.memory, offset, who)
+    response, episode.answers = answer(
+        settings.filter,
+        wish,
+        traffic,
+        danger.free,
+        episode.answers,
+        step.frames == 0,
+        body,
+        settings.table,
+    )
+    return response
+
+
 @inner
 def _keep_plan(cars, episode, sight, plans, settings, step):
     """Defs. 14-18: a plan through the junction ahead."""
     car, n = cars[episode.ego], episode.cars - 1
-    scene = _scene(cars, episode, sight, plans, settings, False)
+    scene = scene_of(cars, episode, sight, plans, settings, False)
     report = junction_frame(
         scene,
         sight.samples[:n],
@@ -245,6 +274,7 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
             step.partner = car_of(held, episode) if held >= 0 else -1
         count_change(step, episode, abs(report.acceleration - car.acceleration), 0.0)
         car.acceleration = report.acceleration
+    note_executed(step, car.acceleration, car.steering)
     _count(episode, step, report, report, report.pairs, report.broken, settings.overrides)
     episode.frames_trapped += report.trapped
     episode.pairs_examined += report.examined
@@ -294,13 +324,19 @@ def _refuse_blocked(before, cars, episode, lanes, sight, settings, step):
     ego = cars[episode.ego]
     if not settings.overrides or not settings.table.rules.take_back or episode.blame != 0 or ego.kind != META:
         return
-    k = ego.target_lane
-    if k == before or lanes[k].road != lanes[before].road:
-        return
-    offsets = sight.lateral[ego.lane, episode.ego], sight.lateral[before, episode.ego]
-    if turns_back(*offsets, k - before) or _is_blocked(k, episode, sight):
+    if is_refused(before, ego, episode, lanes, sight, settings):
         ego.target_lane = before
         step.lane_change_refused = True
+
+
+@inner
+def is_refused(before, ego, episode, lanes, sight, settings):
+    """Is the ego's change from lane `before` to its target blocked, or does it come half-way through another?"""
+    k = ego.target_lane
+    if not settings.table.rules.take_back or k == before or lanes[k].road != lanes[before].road:
+        return False
+    offsets = sight.lateral[ego.lane, episode.ego], sight.lateral[before, episode.ego]
+    return turns_back(*offsets, k - before) or _is_blocked(k, episode, sight)
 
 
 @inner
@@ -353,14 +389,14 @@ def _refuse_lane_change(before, cars, episode, sight, plans, settings):
     if ego.target_lane == before or lanes[ego.target_lane].road != lanes[before].road:
         return
     n, path = episode.cars - 1, episode.path
-    scene = _scene(cars, episode, sight, plans, settings, False)
+    scene = scene_of(cars, episode, sight, plans, settings, False)
     if not has_plan(scene, plans.crossings[:n], settings.entry, not settings.waits_anywhere):
         ego.target_lane, episode.path = before, path
         episode.refused = True
 
 
 @inner
-def _scene(cars, episode, sight, plans, settings, judging):
+def scene_of(cars, episode, sight, plans, settings, judging):
     """The ego's track and the ways that the others may take.
 
     A contact flags both cars at once, so who had crashed is read off the frame before where it is judged.
@@ -425,7 +461,7 @@ def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
         episode.near, past = count, distances.past
         for a in range(count):
             past.near[a] = sight.some[a]
-        measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf)
+        measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf, -np.inf)
     for a in range(count):
         i = sight.some[a]
         verdict = _verdict(i, cars, episode, sight, distances, plans, settings)
@@ -458,7 +494,7 @@ def _verdict(i, cars, episode, sight, distances, plans, settings):
     """Who is to blame for the contact with road user `i`."""
     table = settings.table
     if plans is not None:
-        scene = _scene(cars, episode, sight, plans, settings, True)
+        scene = scene_of(cars, episode, sight, plans, settings, True)
         outside = is_outside(scene.paths, scene.threats, i, sight.on_road[i])
         verdict = judge_crossing(sight.samples[i], plans.crossings[i], outside, table.other, table.dt)
     if distances is not None:

@@ -114,7 +114,7 @@ def car_of(user, episode):
 
 
 @inner
-def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nearest, soonest):
+def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nearest, soonest, within):
     """Take this frame in, and measure the ego and whoever matters on it in the ego's lane frame.
 
     Who that is stands in `past.near`. The ego's record is in `past.ego`, theirs are in `sight.users`, and those of
@@ -127,6 +127,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
       settings: `envs.highway.ego.Settings`.
       chosen: those who matter are in `past.near` already, the first `episode.near`.
       nearest, soonest: as in `shield.lanes.controller.find_danger`.
+      within: whose margin is less than this matters, too [m].
 
     Returns:
       `shield.lanes.frame.Bend` under the ego.
@@ -148,7 +149,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     threshold = _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest)
     if not chosen:
         far = beyond_doubt(me.speed, settings.table.ego, dt)
-        _choose_near(episode, past, sight.x, max(min(threshold, nearest), far) + _ROUNDING)
+        _choose_near(episode, past, sight.x, max(min(threshold, nearest), far, within) + _ROUNDING)
     for a in range(episode.near):
         i = past.near[a]
         k = car_of(i, episode)

@@ -8,6 +8,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from rss_shield.envs.arguments import seed_of, whole
+from rss_shield.envs.decisions.executed import executed_actions
+from rss_shield.envs.decisions.replacement import order_of, replace
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
 from rss_shield.envs.fast.infos import step_infos
@@ -23,7 +25,7 @@ _MODES = {
 
 
 # what a decision has and the beginning of an episode has not
-_OF_DECISIONS = ("raw_reward", "is_success", "proposed_action")
+_OF_DECISIONS = ("raw_reward", "is_success", "proposed_action", "executed_action", "action_replaced")
 
 
 class FastVectorEnv(VectorEnv):
@@ -54,6 +56,7 @@ class FastVectorEnv(VectorEnv):
       penalty_by_change: its mean change of acceleration.
       autoreset_mode: see above.
       threads: threads that share the work. Results do not depend on it.
+      replaces: a meta-action whose mask is False is replaced at the start of the decision; see `ShieldWrapper`.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
@@ -67,6 +70,7 @@ class FastVectorEnv(VectorEnv):
         autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
         threads: int = 1,
         penalty_by_change: bool = False,
+        replaces: bool = False,
     ) -> None:
         self.scenario = scenario
         self.settings = settings
@@ -78,6 +82,7 @@ class FastVectorEnv(VectorEnv):
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
         mode = _MODES[autoreset_mode]
         self.engine = Engine(scenario, num_envs, settings, intervention_penalty, mode, threads, penalty_by_change)
+        self._order = order_of(scenario.labels) if replaces and settings is not None and settings.overrides else None
         self.recording = Recording(self.engine)
         self._everywhere = np.ones(num_envs, bool)
         self._decided = np.zeros(num_envs, bool)  # not where the last call began an episode
@@ -109,25 +114,44 @@ class FastVectorEnv(VectorEnv):
         Returns:
           Observations `[E, ...]`, rewards `[E]`, terminated `[E]`, truncated `[E]`, infos.
         """
-        discrete, commands = self._commands(np.asarray(actions))
+        proposed = np.asarray(actions)
+        discrete, commands = self._commands(proposed)
+        actions = proposed
+        if self._order is not None:
+            actions = discrete = replace(discrete, self.engine.action_masks(), self._order)
         began = self.engine.batch.episodes["ended"].copy()
         outputs = self.engine.step(discrete, commands)
         ended = outputs.terminated | outputs.truncated
         same_step, next_step = self.engine.autoreset == SAME_STEP, self.engine.autoreset == NEXT_STEP
         self.recording.advance(ended, began if next_step else None, same_step)
 
-        actions = np.asarray(actions)
         self._decided = ~ended if same_step else ~began if next_step else self._everywhere
-        self._infos = self._told(outputs.steps, self._decided, actions)
+        self._infos = self._told(outputs.steps, self._decided, actions, proposed)
         infos = _marked(self._infos, self._everywhere, self._decided)
         if ended.any():
             if same_step:
-                infos |= self._finals(outputs, ended, actions)
+                infos |= self._finals(outputs, ended, actions, proposed)
             else:
                 episode = {name: np.where(ended, values, 0) for name, values in self._episode(outputs.steps).items()}
                 infos |= _marked({"episode": episode}, ended, ended)
         self._began[ended if same_step else began] = perf_counter()
         return self._shaped(outputs.observations), outputs.rewards, outputs.terminated, outputs.truncated, infos
+
+    def action_masks(self) -> np.ndarray:
+        """Which meta-actions would pass the coming decision without a proper response, `[E, A]` bool.
+
+        As `ShieldWrapper.action_masks` in every environment; no state changes. All are True where the ego has had its
+        contact, or where the episode is over and the next call begins another one.
+
+        Raises:
+          ValueError: there is no shield, or the actions are no meta-actions.
+        """
+        if self.settings is None:
+            raise ValueError("action_masks with shield = None: expected shield = 'override' or 'monitor'")
+        if not len(self.scenario.labels):
+            kind = type(self.scenario.stock.action_type).__name__
+            raise ValueError(f"action_masks: expected DiscreteMetaAction, not {kind}")
+        return self.engine.action_masks()
 
     def info(self, e: int) -> dict:
         """The last infos of one environment as a plain dictionary."""
@@ -137,8 +161,8 @@ class FastVectorEnv(VectorEnv):
     def close_extras(self, **kwargs) -> None:
         self.engine.close()
 
-    def _finals(self, outputs: Outputs, ended, actions) -> dict:
-        finals = self._told(outputs.final_steps, ended, actions)
+    def _finals(self, outputs: Outputs, ended, actions, proposed) -> dict:
+        finals = self._told(outputs.final_steps, ended, actions, proposed)
         finals["episode"] = self._episode(outputs.final_steps)
         return {
             "final_obs": self._shaped(outputs.final_observations),
@@ -147,15 +171,26 @@ class FastVectorEnv(VectorEnv):
             "_final_info": ended,
         }
 
-    def _told(self, steps, decided, actions=None) -> dict:
+    def _told(self, steps, decided, actions=None, proposed=None) -> dict:
         """Infos, with the actions where one was decided upon."""
         infos = step_infos(steps, self.scenario, self.settings)
         if actions is None:
-            actions = np.zeros(self.action_space.shape, self.action_space.dtype)
-        infos["action"] = np.where(decided.reshape(-1, *[1] * (actions.ndim - 1)), actions, actions.dtype.type(0))
+            actions = proposed = np.zeros(self.action_space.shape, self.action_space.dtype)
+        infos["action"] = _where(decided, actions)
         if self.settings is not None:
-            infos["shield"]["proposed_action"] = infos["action"]
+            executed = self._executed(steps, actions)
+            infos["shield"] |= {
+                "proposed_action": _where(decided, proposed),
+                "executed_action": _where(decided, executed),
+                "action_replaced": decided & (_rows(actions) != _rows(proposed)).any(axis=1),
+            }
         return infos
+
+    def _executed(self, steps, actions) -> np.ndarray:
+        commands = np.full((len(steps), 2), np.nan)
+        np.divide(steps["acceleration"], steps["frames"], out=commands[:, 0], where=steps["frames"] > 0)
+        np.divide(steps["steering"], steps["frames"], out=commands[:, 1], where=steps["frames"] > 0)
+        return executed_actions(self.scenario.stock.action_type, actions, steps["lane_change_refused"], commands)
 
     def _episode(self, steps: np.ndarray) -> dict:
         lasted = np.round(perf_counter() - self._began, 6)
@@ -190,6 +225,15 @@ class FastVectorEnv(VectorEnv):
 
     def _shaped(self, observations: np.ndarray) -> np.ndarray:
         return observations.reshape(self.observation_space.shape)
+
+
+def _rows(actions: np.ndarray) -> np.ndarray:
+    return actions.reshape(len(actions), -1)
+
+
+def _where(decided: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    """Actions `[E, ...]` where one was decided upon, else 0."""
+    return np.where(decided.reshape(-1, *[1] * (actions.ndim - 1)), actions, actions.dtype.type(0))
 
 
 def _marked(infos: dict, where: np.ndarray, decided: np.ndarray) -> dict:

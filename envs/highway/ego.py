@@ -11,6 +11,7 @@ from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, road_thro
 from rss_shield.envs.roads.steering import MAX_SLIP
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
+from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
 from rss_shield.shield.lanes.controller import (
     Body,
@@ -18,6 +19,7 @@ from rss_shield.shield.lanes.controller import (
     find_danger,
     respond,
 )
+from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
 from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
@@ -30,6 +32,7 @@ from rss_shield.shield.tally import (
     count_change,
     count_frame,
     enter_contact,
+    note_executed,
     start_decision,
     start_episode,
 )
@@ -119,6 +122,7 @@ class ShieldedEgo:
         self.record: list[Frame] | None = [] if record else None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
         self.judge = self  # or another, which watches by a table of its own
+        self.answers = False  # does a filter that looks once per decision respond in this one?
         vehicle.act = self.act
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
@@ -162,9 +166,7 @@ class ShieldedEgo:
         response = Response(wish, False, False, False)
         if settings.overrides:
             body = Body(*self.body, bend.curvature, bend.slack, self.backs_up)
-            response = respond(
-                self._taken_back(wish, ego, body), danger, ego, body, settings.table.rules, settings.table.dt
-            )
+            response = self._respond(wish, danger, ego, users, body)
         command = response.command
         pairs, broken = judge_frame(ego, users, self.memory, command, bend.curvature, settings.table)
         steered = steering
@@ -178,6 +180,7 @@ class ShieldedEgo:
         count_change(
             self.tally, self.since, abs(command.acceleration - wish.acceleration), abs(float(steered - steering))
         )
+        note_executed(self.tally, command.acceleration, steered)
         self._count(danger, response, pairs, broken)
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.table.dt)
         tally = self.tally
@@ -187,6 +190,19 @@ class ShieldedEgo:
         if self.record is not None:
             seen = ego, users, bend.curvature, tuple(self.jumped), *before
             self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
+
+    def _respond(self, wish: Command, danger, ego, users, body: Body) -> Response:
+        """What the filter in force makes of a command."""
+        settings, table = self.settings, self.settings.table
+        if settings.filter.kind != RSS:
+            traffic = Traffic(ego, users, self.memory, self._offset_from_target(), None)
+            state = self.answers, bool(self.tally["frames"] == 0)
+            response, self.answers = answer(settings.filter, wish, traffic, danger.free, *state, body, table)
+            return response
+        response = respond(self._taken_back(wish, ego, body), danger, ego, body, table.rules, table.dt)
+        if settings.correction == RESPONSE:
+            response = in_full(response, danger, ego, body, table.rules, table.dt)
+        return response
 
     def _count(self, danger, response, pairs: int, broken: int) -> None:
         on = self.settings.overrides
@@ -210,13 +226,21 @@ class ShieldedEgo:
         vehicle = self.vehicle
         if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.has_contact:
             return
-        target = vehicle.target_lane_index
-        if target == before or target[:2] != before[:2]:
-            return
-        back = turns_back(self._offset(vehicle.lane_index), self._offset(before), target[2] - before[2])
-        if back or self._is_blocked(target):
+        if self.is_refused(before, vehicle.target_lane_index):
             vehicle.target_lane_index = before
             self.tally["lane_change_refused"] = True
+
+    def is_refused(self, before, target) -> bool:
+        """Is a change from one lane to another blocked, or does it come half-way through another?"""
+        if not self.settings.table.rules.take_back or target == before or target[:2] != before[:2]:
+            return False
+        back = turns_back(self._offset(self.vehicle.lane_index), self._offset(before), target[2] - before[2])
+        return bool(back or self._is_blocked(target))
+
+    def _offset_from_target(self) -> float:
+        """Offset from the centre of the lane that the ego heads for, positive to the right [m]."""
+        target = getattr(self.vehicle, "target_lane_index", None)
+        return 0.0 if target is None else self._offset(target)
 
     def _is_blocked(self, index) -> bool:
         """Is the way to the centre of a lane blocked?"""

@@ -11,6 +11,8 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.risk import RiskMeter, check_risk
 from rss_shield.envs.highway.step import attach, shield_on
 from rss_shield.envs.options import Options, Settings, check_mode, settings_for
+from rss_shield.shield.filters.answer import RSS, Filter
+from rss_shield.shield.lanes.correction import NEAREST
 
 
 class EgoShields(gym.Wrapper):
@@ -89,7 +91,7 @@ class EgoShields(gym.Wrapper):
             if shield not in self._egos:
                 _take_off(shield)
         if self.options.traffic == "compliant":
-            shield_everybody(env.road, self._settings)
+            shield_everybody(env.road, self._settings._replace(filter=Filter(RSS), correction=NEAREST))
         return self._egos
 
     def _shield_of(self, i: int, vehicle: Any) -> ShieldedEgo:

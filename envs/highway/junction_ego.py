@@ -25,7 +25,7 @@ from rss_shield.shield.junctions.controller import (
 )
 from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.plans import NEVER, THREAT, Scene
-from rss_shield.shield.tally import count_change
+from rss_shield.shield.tally import count_change, note_executed
 from rss_shield.shield.verdicts import Verdict
 
 
@@ -66,6 +66,7 @@ class JunctionEgo(ShieldedEgo):
         granted = report.acceleration if settings.overrides else acceleration
         if settings.overrides:
             vehicle.action = {"steering": steered, "acceleration": granted}
+        note_executed(self.tally, granted, steered)
         if settings.overrides and report.overridden and self.tally["partner"] < 0:
             held = int(held_by(scene, acceleration, len(self.others), not settings.waits_anywhere))
             self.tally["partner"] = self._index_on_road(held) if held >= 0 else -1

@@ -31,8 +31,8 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
       env: a highway-env environment with `MultiAgentAction`, such as intersection-multi-agent-v0/-v1/-v2.
       intervention_penalty: subtracted from each agent's reward, times what `penalty_on` names of its own; from one
         reward for all, times the mean of that.
-      mode, penalty_on, params, rules, record, entry, intent, waiting, traffic, examine, risk, judge_params,
-        judge_rules: see `ShieldWrapper`.
+      mode, penalty_on, params, rules, record, entry, intent, waiting, traffic, examine, risk, filter, filter_at,
+        correction, judge_params, judge_rules: see `ShieldWrapper`.
 
     Raises:
       ValueError: as `ShieldWrapper`.
@@ -75,7 +75,9 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         reward: Any
         observation, reward, terminated, truncated, info = self.env.step(action)
         egos = self._guard_after_step(egos)
-        agents = tuple(end_step(*one) for one in zip(egos, had_contact, action, strict=True))
+        env: Any = self.env.unwrapped
+        kinds = env.action_type.agents_action_types
+        agents = tuple(end_step(*one) for one in zip(egos, had_contact, action, kinds, strict=True))
         info.update(agents=agents, raw_reward=reward, **traffic_info(self))
         if self.options.intervention_penalty > 0.0:
             charges = [charge(agent, self.options) for agent in agents]
@@ -87,6 +89,8 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
 
     def _check(self) -> None:
         check_agents(self.env.unwrapped)
+        if self.options.replace != "frame":
+            raise ValueError(f"replace = {self.options.replace!r}: expected 'frame' for several agents")
 
 
 def outcome_of_agents(env: Any, actions: tuple) -> tuple[list[float], list[bool]]:

@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
+from rss_shield.envs.decisions.executed import executed_actions
 from rss_shield.envs.highway.compliant import TurnTaker
 from rss_shield.envs.highway.ego import ShieldedEgo, log_of
 from rss_shield.envs.highway.free_ego import FreeEgo
@@ -61,14 +62,33 @@ def begin_step(ego: ShieldedEgo) -> bool:
     return ego.has_contact
 
 
-def end_step(ego: ShieldedEgo, had_contact: bool, action: Any) -> dict[str, Any]:
-    """Judge what happened since `begin_step`; returns the info of this step."""
+def end_step(ego: ShieldedEgo, had_contact: bool, action: Any, kind: Any, handed: Any = None) -> dict[str, Any]:
+    """Judge what happened since `begin_step`; returns the info of this step.
+
+    Args:
+      ego: the shield on the ego.
+      had_contact: before this step.
+      action: that the agent proposed.
+      kind: highway-env's type of the action.
+      handed: the action that was handed to highway-env, None = the agent's.
+    """
     ego.check_contact()
     judge = ego.judge
     at_fault = not had_contact and judge.blame in AT_FAULT
     info = info_of(ego, 1.0 if judge.tally["broken_duties"] or at_fault else 0.0)
+    handed = action if handed is None else handed
     info["shield"]["proposed_action"] = action
+    info["shield"]["executed_action"] = _executed(ego.tally, kind, handed)
+    info["shield"]["action_replaced"] = bool(np.any(np.asarray(action) != np.asarray(handed)))
     return info
+
+
+def _executed(tally: np.void, kind: Any, handed: Any) -> Any:
+    """See `executed_actions`."""
+    frames = tally["frames"] or np.nan
+    commands = np.array([[tally["acceleration"] / frames, tally["steering"] / frames]])
+    refused = np.array([tally["lane_change_refused"]])
+    return executed_actions(kind, np.asarray(handed)[None], refused, commands)[0]
 
 
 def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:

@@ -3,15 +3,18 @@
 from typing import Any, Unpack
 
 import gymnasium as gym
+import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.intersection_env import IntersectionEnv
 
 from rss_shield.envs.arguments import action_of, plain, seed_of
+from rss_shield.envs.decisions.replacement import order_of, replace
 from rss_shield.envs.highway.ego import Frame, ShieldedEgo
 from rss_shield.envs.highway.egos import EgoShields
+from rss_shield.envs.highway.foresight import action_mask, labels_of
 from rss_shield.envs.highway.risk import RiskFrame
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of, tell_inside
-from rss_shield.envs.options import Given, Params, check_environment
+from rss_shield.envs.options import Given, Params, check_environment, check_replace
 from rss_shield.envs.stock import check_frequencies
 from rss_shield.shield.lanes.judge import Audit
 
@@ -28,10 +31,12 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
 
       shield: dict of this step: `intervened`, `override_fraction` (share of the frames in which a
         duty toward somebody changed the command: the proper response), `anticipation_fraction` (in which no duty did,
-        but anticipation), `limited_fraction` (in which only the always-on limits did), `proposed_action` (after a
-        step), `acceleration_change` [m/s^2] and `steering_change` [rad] (largest), `mean_acceleration_change` and
-        `mean_steering_change` (over the frames), `lane_change_refused`, `dangerous`, `dangerous_pairs`, `broken_duties`
-        (pair-frames), and for the pair nearest to danger `partner` (index in `road.vehicles`,
+        but anticipation), `limited_fraction` (in which only the always-on limits did), after a step `proposed_action`,
+        `executed_action` (see `rss_shield.envs.decisions.executed`) and `action_replaced` (before the first frame, with
+        the option `replace`), `acceleration_change` [m/s^2] and `steering_change` [rad] (largest),
+        `mean_acceleration_change` and `mean_steering_change` (over the frames), `lane_change_refused`, `dangerous`,
+        `dangerous_pairs`, `broken_duties` (pair-frames), and for the pair nearest to danger `partner` (index in
+        `road.vehicles`,
         static objects after them, -1 = nobody; where roads cross, who was in the way when the ego was first
         held back in this step), `min_margin_lon`, `min_margin_lat` (gap minus required gap [m], inf = nobody);
         `response`: "none", "longitudinal", "lateral", "both", or "go": on
@@ -80,6 +85,17 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         somebody (`shield.junctions.examined`).
       traffic: "stock", or "compliant": every other car has a shield of its own, in every mode.
       risk: measure the driving safety field around the ego, too: True, or `RiskSettings`.
+      filter: what acts, for comparison: "rss", this shield, or one of the literature's, judged by RSS all the same:
+        "ttc" brakes below a time to collision, "distance-45m" below 45 m, "cbf" is a control barrier function on the
+        headway, "limits" are the always-on limits alone, "literal-def10" is Def. 10 as printed, looked at once per
+        decision. Only along lanes. See `rss_shield.shield.filters`.
+      filter_at: the threshold of "ttc" [s] or "distance-45m" [m], or the headway of "cbf" [s]; None = as in their
+        files.
+      correction: what a duty makes of a command: the "nearest" permitted one, or the proper "response" in full
+        (`rss_shield.shield.lanes.correction`); the latter along lanes only.
+      replace: "frame", commands are restricted on every frame, or "decision", before that a meta-action whose
+        `action_masks` is False is replaced by the nearest one whose mask is True
+        (`rss_shield.envs.decisions.replacement`).
       judge_params, judge_rules: what the ego is judged by, with a memory of its own: blame, duties, cost and dangerous
         pairs. None = what it is restricted by. A sweep over response times needs one judge for all.
 
@@ -138,10 +154,13 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         return observation, info
 
     def step(self, action):
-        executed = action_of(self.action_space, action)
+        handed = action_of(self.action_space, action)
         self._stepping = self._guard()
-        self._action, self._had_contact, self._told = action, begin_step(self._stepping[0]), False
-        observation, reward, terminated, truncated, info = self.env.step(executed)
+        if self.mode == "override" and self.options.replace == "decision" and handed is not None:
+            handed = self._permitted(handed)
+        self._action, self._handed, self._had_contact = action, handed, begin_step(self._stepping[0])
+        self._told = False
+        observation, reward, terminated, truncated, info = self.env.step(handed)
         self.tell(info, reward)
         reward = reward - charge(info, self.options)
         return observation, reward, terminated, truncated, info
@@ -152,11 +171,37 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
             return
         self._told = True
         (ego,) = self._guard_after_step(self._stepping)
-        info.update(end_step(ego, self._had_contact, self._action), **traffic_info(self))
         env: Any = self.env.unwrapped
+        info.update(end_step(ego, self._had_contact, self._action, env.action_type, self._handed), **traffic_info(self))
         info.update(time=float(env.time), raw_reward=reward)
         if isinstance(env, IntersectionEnv):
             info["is_success"] = bool(env.has_arrived(env.vehicle))
+
+    def action_masks(self) -> np.ndarray:
+        """Which meta-actions would pass the coming decision without a proper response, `[A]` bool.
+
+        For each action the ego is played ahead on the frames of one decision, with its own control laws and the
+        always-on limits, while everybody else keeps the speed along the lane and across it. An action is False if on
+        any of these frames a duty would change its command, or if its lane change would be refused or taken back.
+        What anticipation would have made of it does not count. Where roads cross, only the first frame is looked at:
+        an action is False if the shield would change its command there, or refuse its lane change.
+
+        If no action passes, the one is True that is answered last; of several, the first of SLOWER, IDLE, LANE_LEFT,
+        LANE_RIGHT, FASTER. After a contact all are True. The frame shield does not rely on any of this: it acts behind
+        a masked agent as behind any other. In mode "monitor" the mask is the same: what the shield would do.
+
+        `sb3_contrib.MaskablePPO` finds this method. Nothing changes by calling it.
+
+        Raises:
+          ValueError: the actions are no meta-actions.
+        """
+        return action_mask(self._ego, self.env.unwrapped)
+
+    def _permitted(self, action: Any) -> Any:
+        """The action, or the nearest one whose mask is True."""
+        env: Any = self.env.unwrapped
+        order = order_of(labels_of(env.action_type))
+        return int(replace(np.array([action]), self.action_masks()[None], order)[0])
 
     @property
     def _ego(self) -> ShieldedEgo:
@@ -165,6 +210,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
 
     def _check(self) -> None:
         check_environment(self.env.unwrapped)
+        check_replace(self.options, self.env.unwrapped)
 
 
 def traffic_info(wrapper) -> dict[str, Any]:

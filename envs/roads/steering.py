@@ -8,7 +8,7 @@ from rss_shield.envs._numpy.ufuncs import arcsin, arcsin_each, arctan, arctan_ea
 from rss_shield.envs.roads.network import heading_at
 from rss_shield.shield._numba.compiled import inner
 
-_PURSUIT = ControlledVehicle.TAU_PURSUIT  # [s]
+PURSUIT = ControlledVehicle.TAU_PURSUIT  # [s]
 _KP_HEADING = ControlledVehicle.KP_HEADING  # [1/s]
 _KP_LATERAL = ControlledVehicle.KP_LATERAL
 _MAX_STEERING = ControlledVehicle.MAX_STEERING_ANGLE  # [rad]
@@ -18,7 +18,7 @@ MAX_SLIP = float(np.arctan(np.tan(_MAX_STEERING) / 2))  # of a car's centre [rad
 @inner
 def is_aligned(lane, s, lateral, heading, speed):
     """Is there nothing to steer at a point in lane coordinates?"""
-    return (lateral == 0.0) & (heading_at(lane, s + speed * _PURSUIT) == heading)
+    return (lateral == 0.0) & (heading_at(lane, s + speed * PURSUIT) == heading)
 
 
 @inner
@@ -60,6 +60,22 @@ def steer(cars, count, lanes, sight):
 
 
 @inner
+def slip_toward(offset, turn, psi, speed, length):
+    """Slip angle that the law steers with, seen from a lane frame [rad].
+
+    Args:
+      offset: from the middle of the lane, positive to the right [m].
+      turn: heading of the lane where the driver looks, `PURSUIT` ahead, relative to the frame [rad].
+      psi: heading of the car, relative to the frame [rad].
+      speed: [m/s], length: of the car [m].
+    """
+    course = clip(np.arcsin(_sine_back(offset, speed)), -np.pi / 4, np.pi / 4)
+    rate = _KP_HEADING * wrap_to_pi(turn + course - psi)
+    slip = np.arcsin(clip(length / 2 / not_zero(speed) * rate, -1.0, 1.0))
+    return clip(slip, -MAX_SLIP, MAX_SLIP)
+
+
+@inner
 def _sine_back(lateral, speed):
     """Sine of the course, relative to the lane, that leads back to its middle."""
     return clip(-_KP_LATERAL * lateral / not_zero(speed), -1.0, 1.0)
@@ -68,6 +84,6 @@ def _sine_back(lateral, speed):
 @inner
 def _sine_of_slip(lane, s, heading, speed, length, course):
     """Sine of the slip that turns a car to a course relative to the lane [rad], bounded to 45 degrees."""
-    reference = heading_at(lane, s + speed * _PURSUIT) + clip(course, -np.pi / 4, np.pi / 4)
+    reference = heading_at(lane, s + speed * PURSUIT) + clip(course, -np.pi / 4, np.pi / 4)
     rate = _KP_HEADING * wrap_to_pi(reference - heading)
     return clip(length / 2 / not_zero(speed) * rate, -1.0, 1.0)

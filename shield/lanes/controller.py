@@ -430,6 +430,25 @@ def _is_permitted(course, psi_next, slack, v, v_next, drift, bounds, rules):
     )
 
 
+@compiled
+def straighten(ego, a, bounds, body, dt):
+    """Slip angle that ends the sideways motion of a car that drives forward [rad]; 0 for one that does not.
+
+    Args:
+      ego: `ROAD_USER` record.
+      a: its acceleration on this frame [m/s^2].
+      bounds: `Bounds`.
+      body: `Body`.
+      dt: length of a frame [s].
+    """
+    v = ego.speed
+    if v < STANDSTILL:
+        return 0.0
+    turned = body.curvature * v * dt
+    v_next = max(v + a * dt, STANDSTILL)
+    return _straightening_slip(ego.heading, turned, 0.5 * turned * v, v * dt / body.half_wheelbase, v, v_next, bounds)
+
+
 @inner
 def _straightening_slip(psi, turned, drift, gain, v, v_next, bounds):
     """Slip that ends the sideways motion [rad].

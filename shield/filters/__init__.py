@@ -1,0 +1,1 @@
+"""Filters of the literature behind the shield's interface, for comparison: none of them keeps what RSS proves."""
