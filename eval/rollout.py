@@ -60,7 +60,7 @@ def evaluate(
     try:
         observations, _ = env.reset(seed=[int(seed) for seed in seeds[:envs]])
         while len(records) < len(seeds):
-            chosen = policy(observations, env.action_masks()) if masked else policy(observations)
+            chosen = policy(observations, _masks(env)) if masked else policy(observations)
             observations, rewards, terminated, truncated, infos = env.step(chosen)
             returns += rewards
             speeds += infos["speed"]
@@ -82,6 +82,11 @@ def evaluate(
     finally:
         env.close()
     return pd.DataFrame([records[i] for i in range(len(seeds))])
+
+
+def _masks(env: Any) -> np.ndarray:
+    """`action_masks()` of all environments, `[E, A]`: of the engine at once, of others one after the other."""
+    return env.action_masks() if hasattr(env, "action_masks") else np.stack(env.call("action_masks"))
 
 
 def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
