@@ -12,6 +12,7 @@ from rss_shield.envs.stock import drivers_unchanged
 # whole episodes, many of them, or new processes: left out by `make test-fast`
 SLOW = frozenset(
     [
+        "agents/test_baselines",
         "agents/test_ppo",
         "envs/test_arguments",
         "envs/test_backing_up",
