@@ -66,8 +66,10 @@ SLOW = frozenset(
         "shield/test_theorems",
         "shield/test_comfort",
         "shield/test_def18_junction_response",
+        "test_campaign",
         "test_install",
         "test_pages",
+        "test_test_command",
         "test_train_cli",
     ]
 )
