@@ -14,7 +14,7 @@ PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help compare $(ENVS:%=compare-%) test test-fast bench evidence docs check clean
+.PHONY: help compare $(ENVS:%=compare-%) test test-fast bench evidence campaign docs check clean
 
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -39,6 +39,9 @@ bench: $(VENV)/installed-dev  ## run the benchmarks
 
 evidence: $(VENV)/installed  ## play scripted policies under the shield and count who is to blame (hours)
 	$(BIN)/python bench/evidence.py $(ARGS)
+
+campaign: $(VENV)/installed  ## train every arm on two roads with many seeds, or go on with it (hours)
+	$(BIN)/python bench/campaign.py $(ARGS)
 
 docs: $(VENV)/installed-docs  ## build the site into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

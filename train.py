@@ -1,36 +1,40 @@
-"""Train PPO with and without the RSS shield, test each with and without it, and report who crashes."""
+"""Train agents with and without the RSS shield, test each with and without it, and report who crashes."""
 
 from rss_shield.eval.interrupt import stop_on_interrupt
 
 if __name__ == "__main__":  # before all that takes its time
     stop_on_interrupt("train.py: stopping; nothing that is finished is lost, the same command with --resume goes on")
 
-import contextlib
 import functools
 import hashlib
-import io
-import json
 import math
 import multiprocessing
 import os
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
-import tyro
+import pandas as pd
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 import rss_shield
-from rss_shield.agents.ppo import available_devices, hyperparameters, load_policy, rounded_timesteps, train
+from rss_shield.agents.blocks import available_devices, train_in_blocks
+from rss_shield.agents.learner import Learner, learner_of
+from rss_shield.agents.load import load_policy, policy_of
+from rss_shield.command_line import ConfigFile, fail, parsed, shown
 from rss_shield.envs.configuration import check_config, default_config
+from rss_shield.envs.fast.config import Unsupported
+from rss_shield.envs.highway.idm_ego import make_idm_vec
 from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import PENALTIES, PLANS, WAITING, default_preset, scheme_of
-from rss_shield.eval.config_option import read_config, split_arguments, with_values
+from rss_shield.eval import drivers, removal
+from rss_shield.eval.arms import ARMS, FROM_OPTIONS, SHIELDED, Arm, arm_named, table
+from rss_shield.eval.config_option import split_arguments, with_values
 from rss_shield.eval.jobs import Job, run_jobs
 from rss_shield.eval.replay import chosen, replay
 from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
@@ -40,13 +44,12 @@ from rss_shield.shield.junctions.controller import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
 
-TRAIN_MODE = {"unshielded": "monitor", "shielded": "override"}  # what the shield does in training
-TEST_MODE = {"off": "monitor", "on": "override"}  # a monitor assigns blame and changes nothing
 TEST_ENVS = {"fast": 256, "highway-env": 1}  # side by side in testing; the engine is the faster, the more there are
-HELP = """Train PPO with and without the RSS shield, test each with and without it, report who crashes.
+PROGRAM = "train.py"
+HELP = """Train agents with and without the RSS shield, test each with and without it, report who crashes.
 
-One table at the end: shield {off, on} in training x {off, on} in testing. Everything is written
-to runs/NAME.
+One table at the end: arms x shield {off, on} in testing; by default the arms are PPO with the shield {off, on} in
+training. Everything is written to runs/NAME.
 
 examples:
   python train.py
@@ -69,6 +72,10 @@ examples:
       the same from a file; what the command line says wins
   python train.py --arms shielded --intervention-penalty 0.1
       one arm, which pays for what the shield must correct
+  python train.py --arms lazy idm shielded adaptive-penalty --target-intervention 0.5
+      drivers that learn nothing beside agents, one of which pays until the shield changes 0.5 m/s^2 on average
+  python train.py --list-arms
+      all there are
   python train.py --resume --name my-run
       go on with a run that was stopped, with the options it was started with
 """
@@ -77,6 +84,7 @@ NAMES = "letters, digits and . , = + - _"
 LONGEST_NAME = 120
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
 FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
+FIRST_REMOVAL_SEED = 2 * 10**9  # likewise of the tests on the way, far from both
 
 
 @dataclass(frozen=True)
@@ -95,19 +103,6 @@ class Overrides:
     v_cap: float | None = None  # [m/s], > 0: speed above which nobody accelerates
 
 
-# a file is read where the command line is
-ConfigFile = Annotated[
-    dict[str, Any],
-    tyro.constructors.PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="FILE",
-        instance_from_str=lambda texts: read_config(texts[0]),
-        is_instance=lambda value: isinstance(value, dict),
-        str_from_instance=lambda value: [json.dumps(value)],
-    ),
-]
-
-
 @dataclass(frozen=True)
 class Config:
     """What `python train.py --help` shows; one option a field."""
@@ -120,9 +115,12 @@ class Config:
     backend: str = "fast"
     """What simulates: fast (the compiled engine, with the same trajectories) or highway-env (the original)."""
     arms: tuple[str, ...] = ("unshielded", "shielded")
-    """What to train: unshielded (the shield only watches), shielded (it overrides), or both."""
+    """What to compare, e.g. unshielded (PPO, the shield only watches), shielded (PPO, it overrides), lazy, idm,
+    penalty-0.5, adaptive-penalty; --list-arms shows all."""
+    list_arms: bool = False
+    """Show the table of arms and stop."""
     total_timesteps: int = 200_000
-    """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 8192."""
+    """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 8192 for PPO."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds; each trains every arm once."""
     preset: str = "auto"
@@ -140,19 +138,31 @@ class Config:
     waiting: str = "line"
     """Where it may wait there: at the line, or anywhere that is in the way of nobody who is there."""
     intervention_penalty: float = 0.0
-    """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward."""
+    """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward. Arms with a
+    penalty of their own, as penalty-0.5, keep theirs."""
     penalty_on: str = "response"
     """What it is times: response (share of frames overridden) or change (of acceleration, mean [m/s^2])."""
+    target_intervention: float = 0.5
+    """Of the arm adaptive-penalty: the mean change of acceleration [m/s^2] toward which its penalty moves."""
+    target_share: float = 0.01
+    """Of the arm adaptive-share: likewise the share of frames that a proper response overrides."""
+    cost_limit: float = 0.01
+    """Of the arm ppo-lagrangian: wanted mean of info["cost"] per decision (1 where the ego breaks a duty or a
+    contact is its fault)."""
     eval_episodes: int = 1000
     """Test episodes per trained model and test condition, on the same seeds for all."""
     replay_episodes: int = 5
     """How many of these are played again on the original simulator and compared; none if it is the backend."""
+    removal_checks: int = 10
+    """How often an agent is tested with and without the shield on its way through training, at most; 0: never."""
+    removal_episodes: int = 50
+    """Test episodes of each of these tests, in the engine, on seeds of their own."""
     n_envs: int = 128
     """Environments side by side in each training."""
     workers: int = os.cpu_count() or 1
     """Processes that share the trainings and tests. Results do not depend on it."""
     device: str = "cpu"
-    """Where PPO learns: cpu, cuda or auto. For networks this small the CPU is faster."""
+    """Where agents learn: cpu, cuda or auto. For networks this small the CPU is faster."""
     name: str = ""
     """Folder of the run inside runs-dir; by default made from the options that differ from their defaults."""
     runs_dir: Path = Path("runs")
@@ -165,28 +175,52 @@ class Config:
 
 
 def main(arguments: list[str]) -> None:
+    if "--list-arms" in arguments:
+        print_arms()
+        return
     try:
         config, folder = started(arguments)
         preset = resolve(config)
         env = tried(config, preset)
         warnings = open_run(folder, record(config, preset, env), resume=config.resume, overwrite=config.overwrite)
     except (ValueError, OSError) as error:
-        fail(" ".join(str(error).split()))
+        fail(PROGRAM, str(error))
     for warning in warnings:
         print(f"train.py: warning: {warning}", file=sys.stderr)
 
-    models = [(arm, seed) for seed in config.seeds for arm in config.arms]
-    cells = [(arm, seed, test) for arm, seed in models for test in TEST_MODE]
+    models = [(arm, seed) for seed in config.seeds for arm in config.arms if not ARMS[arm].scripted]
+    cells = [cell for seed in config.seeds for arm in config.arms for cell in cells_of(config, ARMS[arm], seed)]
     untrained = [model for model in models if not model_path(folder, *model).exists()]
     run_jobs([training(config, preset, folder, *model) for model in untrained], config.workers)
     untested = [cell for cell in cells if not cell_path(folder, *cell).exists()]
     run_jobs([testing(config, preset, folder, *cell) for cell in untested], config.workers)
     if config.backend == "fast" and config.replay_episodes:
-        unchecked = [cell for cell in cells if not replay_path(folder, *cell).exists()]
+        played = [cell for cell in cells if in_engine(ARMS[cell[0]])]
+        unchecked = [cell for cell in played if not replay_path(folder, *cell).exists()]
         run_jobs([replaying(config, preset, folder, *cell) for cell in unchecked], config.workers)
 
     write_report(folder)
     print(f"\nEverything is in {folder}: table.md, results.json, learning_curve.png, blame.png, ...")
+
+
+def cells_of(config: Config, arm: Arm, seed: int) -> list[tuple[str, int, str]]:
+    """Where an arm is tested; who learns nothing is tested once, not once a training seed."""
+    if arm.scripted and seed != config.seeds[0]:
+        return []
+    return [(arm.name, seed, test) for test in arm.tests]
+
+
+def in_engine(arm: Arm) -> bool:
+    """Can its episodes be played by numbered actions in the engine?"""
+    return not arm.backend and not arm.continuous
+
+
+def print_arms() -> None:
+    """The table of arms, as wide as it must be."""
+    rows = table()
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())
 
 
 def started(arguments: list[str]) -> tuple[Config, Path]:
@@ -271,40 +305,56 @@ def _works(config: Config, preset: Preset) -> bool:
 
 
 def _tried(config: Config, preset: Preset) -> gym.Env:
-    env = original(config, preset, "override")()
+    envs = [_tried_arm(config, preset, ARMS[name]) for name in _unlike(config.arms)]
+    return envs[0]
+
+
+def _unlike(names: Sequence[str]) -> list[str]:
+    """One arm of each kind of environment."""
+    return list({shown(sorted(ARMS[name].config.items())): name for name in reversed(names)}.values())[::-1]
+
+
+def _tried_arm(config: Config, preset: Preset, arm: Arm) -> gym.Env:
+    env = original(config, preset, arm, SHIELDED)()
     env.close()
     actions, observations = env.action_space, env.observation_space
-    if not isinstance(actions, gym.spaces.Discrete):
-        raise ValueError(f"env_id = {config.env_id!r}: actions {actions}; expected Discrete ones")
+    kind, called = (gym.spaces.Box, "a Box") if arm.continuous else (gym.spaces.Discrete, "Discrete ones")
+    if not isinstance(actions, kind):
+        raise ValueError(f"env_id = {config.env_id!r}: actions {actions}; expected {called}")
     if not (isinstance(observations, gym.spaces.Box) and np.issubdtype(observations.dtype, np.floating)):
         raise ValueError(f"env_id = {config.env_id!r}: observations {observations}; expected a Box of floats")
-    first = batch(config, preset, "override", n_envs=1)
+    first = batch(config, preset, arm, SHIELDED, n_envs=1)
     first.reset(seed=0)
-    first.step(np.zeros(1, int))  # and the engine is compiled once for all workers
+    first.step(np.zeros((1, *(actions.shape or ())), actions.dtype))  # and the engine is compiled once for all workers
     first.close()
     return env
 
 
-def original(config: Config, preset: Preset, mode: str) -> Callable[..., gym.Env]:
+def original(config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any]) -> Callable[..., gym.Env]:
     """Builds an environment of the original simulator."""
-    return functools.partial(rss_shield.make, config.env_id, shield=mode, params=preset, **setting(config))
+    return functools.partial(rss_shield.make, config.env_id, params=preset, **shield, **setting(config, arm))
 
 
-def batch(config: Config, preset: Preset, mode: str, n_envs: int, **options: Any) -> VectorEnv:
-    """Environments of the chosen simulator side by side."""
-    options |= {"backend": config.backend, "params": preset, **setting(config)}
-    return rss_shield.make_vec(config.env_id, n_envs, shield=mode, **options)
+def batch(
+    config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any], n_envs: int, **options: Any
+) -> VectorEnv:
+    """Environments of the chosen simulator side by side, as an arm needs them."""
+    options = {"backend": config.backend, **options, "params": preset, **shield, **setting(config, arm)}
+    return rss_shield.make_vec(config.env_id, n_envs, **options)
 
 
-def setting(config: Config) -> dict[str, Any]:
-    """The environment's configuration, and how the ego behaves where roads cross."""
+def test_batch(config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any], n_envs: int) -> VectorEnv:
+    """The same for tests, where the next episode begins when it is told to."""
+    if arm.scripted and arm.settings["driver"] == "idm":
+        return make_idm_vec(config.env_id, n_envs, params=preset, **shield, **setting(config, arm))
+    return batch(config, preset, arm, shield, n_envs, autoreset_mode=AutoresetMode.DISABLED)
+
+
+def setting(config: Config, arm: Arm) -> dict[str, Any]:
+    """The environment's configuration, if it is told any, and how the ego behaves where roads cross."""
     conduct = {"entry": config.entry, "intent": config.intent, "waiting": config.waiting}
-    return {**conduct, **configured(config)}
-
-
-def configured(config: Config) -> dict[str, Any]:
-    """The environment's configuration, if it is told any."""
-    return {"config": config.config} if config.config else {}
+    configured = {**config.config, **arm.config}
+    return {**conduct, "config": configured} if configured else conduct
 
 
 def model_path(folder: Path, arm: str, seed: int) -> Path:
@@ -313,7 +363,7 @@ def model_path(folder: Path, arm: str, seed: int) -> Path:
 
 
 def training(config: Config, preset: Preset, folder: Path, arm: str, seed: int) -> Job:
-    total = rounded_timesteps(config.n_envs, config.total_timesteps)
+    total = learner(config, ARMS[arm]).rounded(config.n_envs, config.total_timesteps)
     return Job(f"train {arm}, seed {seed}", total, "step", functools.partial(_train, config, preset, folder, arm, seed))
 
 
@@ -328,63 +378,113 @@ def replaying(config: Config, preset: Preset, folder: Path, arm: str, seed: int,
     return Job(f"replay {arm}, seed {seed}, shield {test}", count, "episode", work)
 
 
+def learner(config: Config, arm: Arm) -> Learner:
+    """The learner of an arm."""
+    fixed = {name: value for name, value in arm.settings.items() if name != FROM_OPTIONS}
+    asked = {name: getattr(config, option) for name, option in arm.settings.get(FROM_OPTIONS, {}).items()}
+    return learner_of(arm.learner, **fixed, **asked)
+
+
 def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, progress: Progress) -> None:
-    paid: dict[str, Any] = {"intervention_penalty": config.intervention_penalty, "penalty_on": config.penalty_on}
-    train(
-        functools.partial(batch, config, preset, TRAIN_MODE[arm], **paid),
+    row = ARMS[arm]
+    paid = {"intervention_penalty": config.intervention_penalty, "penalty_on": config.penalty_on}
+    chosen = learner(config, row)
+    total = chosen.rounded(config.n_envs, config.total_timesteps)
+    path = model_path(folder, arm, seed).parent / removal.FILE
+    train_in_blocks(
+        chosen,
+        functools.partial(batch, config, preset, row, {**paid, **row.training}),
         model_path(folder, arm, seed).parent,
         seed=seed,
         total_timesteps=config.total_timesteps,
         n_envs=config.n_envs,
         device=config.device,
         progress=progress,
+        watch=functools.partial(_remove, config, preset, row, total, path),
     )
+
+
+def _remove(config: Config, preset: Preset, arm: Arm, total: int, path: Path, model: Any) -> None:
+    """Test the agent as it is now with the shield and without, if it is time to."""
+    rows = removal.read(path)
+    rows = rows[rows["timesteps"] < model.num_timesteps]  # what a killed run had gone on to will happen again
+    if not config.removal_checks or not config.removal_episodes:
+        return
+    if not removal.is_due(rows, model.num_timesteps, total, config.removal_checks):
+        return
+    try:
+        here = replace(config, backend="fast")  # the same trajectories, sooner
+        tests = {
+            test: _played(here, preset, arm, shield, policy_of(model), FIRST_REMOVAL_SEED, config.removal_episodes)
+            for test, shield in arm.tests.items()
+        }
+    except Unsupported:
+        return
+    removal.record(path, rows, model.num_timesteps, tests)
 
 
 def _test(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:
-    episodes = evaluate(
-        functools.partial(batch, config, preset, TEST_MODE[test], autoreset_mode=AutoresetMode.DISABLED),
-        load_policy(model_path(folder, arm, seed)),
-        range(FIRST_TEST_SEED, FIRST_TEST_SEED + config.eval_episodes),
-        n_envs=TEST_ENVS[config.backend],
+    row = ARMS[arm]
+    policy = driver(config, preset, row, seed) if row.scripted else load_policy(model_path(folder, arm, seed))
+    count = config.eval_episodes
+    episodes = _played(config, preset, row, row.tests[test], policy, FIRST_TEST_SEED, count, progress)
+    write_cell(cell_path(folder, arm, seed, test), episodes, arm, seed, test)
+
+
+def _played(
+    config: Config,
+    preset: Preset,
+    arm: Arm,
+    shield: Mapping[str, Any],
+    policy: Callable[..., np.ndarray],
+    first: int,
+    count: int,
+    progress: Progress = lambda episodes: None,
+) -> pd.DataFrame:
+    return evaluate(
+        functools.partial(test_batch, config, preset, arm, shield),
+        policy,
+        range(first, first + count),
+        n_envs=TEST_ENVS[arm.backend or config.backend],
+        keep_actions=in_engine(arm),
+        masked=arm.masked and shield["shield"] == "override",
         progress=progress,
     )
-    write_cell(cell_path(folder, arm, seed, test), episodes, arm, seed, test)
+
+
+def driver(config: Config, preset: Preset, arm: Arm, seed: int) -> drivers.Driver:
+    """The policy of an arm that learns nothing."""
+    env: Any = original(config, preset, arm, SHIELDED)()
+    env.close()
+    numbers = env.unwrapped.action_type.actions_indexes
+    name = arm.settings["driver"]
+    if name == "random":
+        return drivers.uniform(len(numbers), np.random.default_rng(seed))
+    return drivers.always(numbers["IDLE" if name == "idm" else name])  # that one drives itself
 
 
 def _replay(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:
     sample = chosen(read_cell(cell_path(folder, arm, seed, test)), config.replay_episodes, seed)
-    replays = replay(original(config, preset, TEST_MODE[test]), sample, progress)
+    replays = replay(original(config, preset, ARMS[arm], ARMS[arm].tests[test]), sample, progress)
     write_cell(replay_path(folder, arm, seed, test), replays, arm, seed, test)
 
 
 def parse(arguments: list[str], default: Config) -> Config:
     """Read the command line. What cannot be read ends in one line and exit code 2."""
-    printed = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(printed):
-            return tyro.cli(
-                Config,
-                prog="train.py",
-                description=HELP,
-                args=arguments,
-                default=default,
-                config=(tyro.conf.FlagCreatePairsOff,),
-            )
-    except SystemExit as stop:
-        if not stop.code:  # --help
-            raise
-        _, *box = (line.strip("│| ") for line in printed.getvalue().splitlines() if line.strip())
-        message = " ".join(line for line in box if line.strip("─-╰╯+"))
-        fail(re.split("Argument helptext|For full helptext", message)[0] + "(see train.py --help)")
+    return parsed(Config, PROGRAM, HELP, arguments, default)
 
 
 def check(config: Config) -> None:
     """Refuse what is out of range, naming option, value and range. RSS parameters: see `resolve`."""
-    arms, presets, devices = list(TRAIN_MODE), ["auto", *PRESETS], available_devices()
+    presets, devices = ["auto", *PRESETS], available_devices()
+    for arm in config.arms:
+        try:
+            arm_named(arm)
+        except ValueError as error:
+            fail(PROGRAM, f"--arms: {error}")
     for option, good, expected in (
         ("backend", config.backend in BACKENDS, f"one of {', '.join(BACKENDS)}"),
-        ("arms", is_set_of(config.arms, arms), f"one or more of {', '.join(arms)}"),
+        ("arms", is_set_of(config.arms, list(ARMS)), "one or more different names"),
         ("total_timesteps", config.total_timesteps >= 1, "at least 1"),
         ("seeds", is_set_of(config.seeds, range(2**32)), "different whole numbers, 0 to 2**32 - 1"),
         ("preset", config.preset in presets, f"one of {', '.join(presets)}"),
@@ -393,6 +493,11 @@ def check(config: Config) -> None:
         ("waiting", config.waiting in WAITING, f"one of {', '.join(WAITING)}"),
         ("intervention_penalty", 0 <= config.intervention_penalty < math.inf, "a number >= 0"),
         ("penalty_on", config.penalty_on in PENALTIES, f"one of {', '.join(PENALTIES)}"),
+        ("target_intervention", 0 <= config.target_intervention < math.inf, "a number >= 0"),
+        ("target_share", 0 <= config.target_share <= 1, "0 to 1"),
+        ("cost_limit", 0 <= config.cost_limit <= 1, "0 to 1"),
+        ("removal_checks", config.removal_checks >= 0, "at least 0"),
+        ("removal_episodes", config.removal_episodes >= 0, "at least 0"),
         ("eval_episodes", config.eval_episodes >= 1, "at least 1"),
         ("replay_episodes", config.replay_episodes >= 0, "at least 0"),
         ("n_envs", 1 <= config.n_envs <= 4096, "1 to 4096"),
@@ -403,7 +508,7 @@ def check(config: Config) -> None:
     ):
         if not good:
             value = shown(getattr(config, option))
-            fail(f"--{option.replace('_', '-')} {value} is out of range: expected {expected}")
+            fail(PROGRAM, f"--{option.replace('_', '-')} {value} is out of range: expected {expected}")
 
 
 def is_set_of(values: tuple, accepted: Sequence) -> bool:
@@ -454,7 +559,13 @@ def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
             "rules": Rules()._asdict(),  # the margins of the published table
         },
         "environment": env.unwrapped.config,  # type: ignore[attr-defined]  # the whole of it
-        "ppo": hyperparameters(config.n_envs, config.total_timesteps),
+        **{
+            arm.name if arm.settings else arm.learner: learner(config, arm).hyperparameters(
+                config.n_envs, config.total_timesteps
+            )
+            for arm in map(arm_named, config.arms)
+            if not arm.scripted
+        },
         "test_seeds": {"first": FIRST_TEST_SEED, "last": FIRST_TEST_SEED + config.eval_episodes - 1},
     }
 
@@ -476,23 +587,11 @@ def valid_name(text: str) -> str:
     return name
 
 
-def shown(value: Any, separator: str = " ") -> str:
-    """A value as on a command line."""
-    if value is None:
-        return "(not given)"
-    return separator.join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-
-
-_NOT_RECORDED = ("workers", "name", "runs_dir", "resume", "overwrite")
+_NOT_RECORDED = ("list_arms", "workers", "name", "runs_dir", "resume", "overwrite")
 
 
 def _given(overrides: Overrides) -> dict[str, float]:
     return {name: value for name, value in asdict(overrides).items() if value is not None}
-
-
-def fail(message: str) -> NoReturn:
-    print(f"train.py: error: {message}", file=sys.stderr)
-    raise SystemExit(2)
 
 
 def run(arguments: list[str]) -> None:
@@ -501,6 +600,7 @@ def run(arguments: list[str]) -> None:
     multiprocessing.set_forkserver_preload(
         [
             "rss_shield.envs.make_vec",
+            "rss_shield.agents.blocks",
             "rss_shield.agents.ppo",
             "rss_shield.eval.jobs",
             "rss_shield.eval.orphans",

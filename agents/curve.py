@@ -55,12 +55,10 @@ class CurveRecorder(BaseCallback):
         n_envs, rewards, dones = self.training_env.num_envs, self.locals["rewards"], self.locals["dones"]
         self.returns += rewards
         self.lengths += 1
-        ended = [
-            episode_row(self.num_timesteps, n_envs, info)
-            for done, info in zip(dones, self.locals["infos"], strict=True)
-            if done
-        ]
-        self._write(ended)
+        infos = self.locals["infos"]
+        ended = [episode_row(self.num_timesteps, n_envs, infos[e]) for e in np.flatnonzero(dones).tolist()]
+        if ended:
+            self._write(ended)
         self.returns[dones], self.lengths[dones] = 0.0, 0
         at_fault = sum(row["blame"] in ("ego", "both") for row in ended)
         self.logger.record_mean("decision/reward", float(np.mean(rewards)))

@@ -1,8 +1,22 @@
 """A gymnasium vector environment as a stable-baselines3 `VecEnv`."""
 
+from typing import Any, Protocol
+
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from stable_baselines3.common.vec_env import VecEnv
+
+MASKS = "action_masks"  # the one method that answers for all environments at once
+
+
+class Charge(Protocol):
+    """What is taken off the rewards of a training."""
+
+    def begin(self) -> None:
+        """All environments begin an episode."""
+
+    def __call__(self, env: "VectorEnvAdapter") -> np.ndarray:
+        """Of the last decision, `[E]`."""
 
 
 class VectorEnvAdapter(VecEnv):
@@ -10,24 +24,34 @@ class VectorEnvAdapter(VecEnv):
 
     The list of infos holds a dictionary of its own only where an episode ended, with
     `terminal_observation`, `TimeLimit.truncated` and what the vector environment's `final_info` says
-    (so `episode` reaches SB3's logger). Everything about a step is in `last_infos`, as arrays.
+    (so `episode` reaches SB3's logger). Everything about a step is in `last_infos`, as arrays; `told` has single
+    values of the decision that was made, also where an episode ended.
 
     Args:
       env: a vector environment with autoreset in the same step.
+      charge: taken off the rewards; None = nothing.
     """
 
-    def __init__(self, env: VectorEnv) -> None:
+    autoreset_mode = AutoresetMode.SAME_STEP
+
+    def __init__(self, env: VectorEnv, charge: Charge | None = None) -> None:
         mode = env.metadata.get("autoreset_mode")
-        if mode != AutoresetMode.SAME_STEP:
-            raise ValueError(f"autoreset_mode = {mode}: expected {AutoresetMode.SAME_STEP}")
+        if mode != self.autoreset_mode:
+            raise ValueError(f"autoreset_mode = {mode}: expected {self.autoreset_mode}")
         self.env = env
+        self.charge = charge
         self.last_infos: dict = {}
+        self.ended = np.zeros(env.num_envs, bool)  # by the last step
+        self.truncated = np.zeros(env.num_envs, bool)
         self._seed: int | None = None
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self):
         observations, self.last_infos = self.env.reset(seed=self._seed)
         self._seed = None
+        self.ended, self.truncated = np.zeros((2, self.num_envs), bool)
+        if self.charge is not None:
+            self.charge.begin()
         self.reset_infos = [{} for _ in range(self.num_envs)]
         return observations
 
@@ -42,18 +66,41 @@ class VectorEnvAdapter(VecEnv):
     def step_wait(self):
         observations, rewards, terminated, truncated, infos = self.env.step(self._actions)
         self.last_infos = infos
-        ended = terminated | truncated
+        self.ended, self.truncated = terminated | truncated, truncated & ~terminated
         nothing: dict = {}
         list_of_infos = [nothing] * self.num_envs
-        for e in np.flatnonzero(ended).tolist():
+        for e in np.flatnonzero(self.ended).tolist():
             info = one(infos["final_info"], e)
             info["terminal_observation"] = infos["final_obs"][e]
-            info["TimeLimit.truncated"] = bool(truncated[e] and not terminated[e])
+            info["TimeLimit.truncated"] = bool(self.truncated[e])
             list_of_infos[e] = info
-        return observations, rewards.astype(np.float32), ended, list_of_infos
+        return observations, self._charged(rewards), self.ended, list_of_infos
+
+    def _charged(self, rewards: np.ndarray) -> np.ndarray:
+        rewards = np.array(rewards, np.float32)
+        if self.charge is not None:
+            rewards -= self.charge(self)
+        return rewards
+
+    def told(self, *keys: str) -> np.ndarray:
+        """What infos say about the last decision of every environment, e.g. `told("shield", "override_fraction")`.
+
+        Returns:
+          `[E]`; where an episode ended, of its last decision and not of the episode that began.
+        """
+        if not self.ended.any():
+            return _under(self.last_infos, keys)
+        finals = _under(self.last_infos["final_info"], keys)
+        if self.ended.all():  # some keys are there only where a decision was made
+            return finals
+        values = _under(self.last_infos, keys)
+        return np.where(self.ended.reshape(-1, *[1] * (np.ndim(values) - 1)), finals, values)
 
     def close(self) -> None:
         self.env.close()
+
+    def has_attr(self, attr_name: str) -> bool:
+        return attr_name == MASKS or hasattr(self.env, attr_name)  # whoever has no masks says so when asked
 
     def get_attr(self, attr_name, indices=None):
         return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
@@ -62,11 +109,30 @@ class VectorEnvAdapter(VecEnv):
         raise NotImplementedError("the environments of a vector environment share their attributes")
 
     def env_method(self, method_name, *method_args, indices=None, **method_kwargs):
+        """The answers of single environments, as a list.
+
+        `action_masks()` is asked for once, and answers for all: its rows `[A]` are returned.
+        """
+        if method_name == MASKS:
+            masks = action_masks(self.env)
+            return [masks[e] for e in self._get_indices(indices)]
         method = getattr(self.env, method_name)
         return [method(e, *method_args, **method_kwargs) for e in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class, indices=None):
         return [False] * len(list(self._get_indices(indices)))
+
+
+def action_masks(env: Any) -> np.ndarray:
+    """`action_masks()` of all environments, `[E, A]`: of the engine at once, of others one after the other."""
+    together = getattr(env, MASKS, None)
+    return np.stack(env.call(MASKS)) if together is None else together()
+
+
+def _under(infos: Any, keys: tuple[str, ...]) -> Any:
+    for key in keys:
+        infos = infos[key]
+    return infos
 
 
 def one(infos: dict, e: int) -> dict:

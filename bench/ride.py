@@ -15,7 +15,6 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium as gym
 import matplotlib
 import numpy as np
 import pandas as pd
@@ -26,11 +25,11 @@ from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.controller import MDPVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from rss_shield import ShieldWrapper, make, make_vec
+from rss_shield import make, make_vec
 from rss_shield.envs.fast.config import Unsupported
 from rss_shield.envs.highway.ego import ShieldedEgo
+from rss_shield.envs.highway.idm_ego import make_idm
 from rss_shield.envs.options import Settings
-from rss_shield.envs.stock import make_stock
 from rss_shield.eval.files import write_text
 from rss_shield.eval.rollout import evaluate, run_episode
 from rss_shield.eval.stats import paired_difference
@@ -70,23 +69,6 @@ class Config:
     write: bool = False  # docs/ride.md and docs/ride.png
 
 
-class IdmEgo(gym.Wrapper):
-    """highway-env's own driver takes the place of the ego; actions change nothing."""
-
-    def reset(self, *, seed=None, options=None):
-        observation, info = self.env.reset(seed=seed, options=options)
-        env: Any = self.env.unwrapped
-        stock = env.vehicle
-        driver = IDMVehicle.create_from(stock)
-        driver.route, driver.target_speed = stock.route, 30.0
-        driver.target_speeds, driver.speed_index = stock.target_speeds, stock.speed_index  # some rewards ask for them
-        env.road.vehicles[env.road.vehicles.index(stock)] = driver
-        env.controlled_vehicles = [driver]
-        env.action_type.controlled_vehicle = driver
-        env.observation_type.observer_vehicle = driver
-        return observation, info
-
-
 # ---------------------------------------------------------------- episodes
 
 
@@ -124,11 +106,7 @@ def play_idm(env_id: str, episodes: int) -> pd.DataFrame:
     """The same of highway-env's own driver, watched."""
     seeds = range(FIRST_SEED, FIRST_SEED + episodes)
 
-    def watched() -> gym.Env:
-        seen = {"observation": {"type": "Kinematics"}}  # others may ask for what only MDPVehicle has
-        return ShieldWrapper(IdmEgo(make_stock(env_id, config=seen)), mode="monitor")
-
-    return pd.DataFrame([run_episode(watched, lambda _: IDLE, seed) for seed in seeds])
+    return pd.DataFrame([run_episode(lambda: make_idm(env_id), lambda _: IDLE, seed) for seed in seeds])
 
 
 class Row(NamedTuple):

@@ -12,6 +12,7 @@ from typing import Any
 
 import pandas as pd
 
+from rss_shield.eval import arms
 from rss_shield.eval.files import write_text
 from rss_shield.eval.replay import verdict
 from rss_shield.eval.table import legend, table_frame
@@ -101,7 +102,23 @@ def _replayed(replays: list[dict[str, Any]]) -> list[str]:
     return [verdict(pd.DataFrame(replays))] if replays else []
 
 
+# ---------------------------------------------------------------- arms
+
+
+ARMS_PAGE = Path("docs/arms.md")
+
+
+def arms_block() -> str:
+    """The table of arms as the page has it."""
+    heading, *rows = arms.table()
+    return markdown([heading, *([f"`{row[0]}`", *row[1:]] for row in rows)])
+
+
 def main(runs: list[Path]) -> None:
+    if runs == [Path("--arms")]:
+        fill(ARMS_PAGE, "arms", arms_block())
+        print(f"written: {ARMS_PAGE}")
+        return
     write_page(PPO_PAGE, ppo_page(runs or sorted(Path("runs").iterdir())))
     print(f"written: {PPO_PAGE}")
 

@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from rss_shield.eval.arms import ARMS
 from rss_shield.eval.files import atomic
 from rss_shield.eval.stats import Interval, completion_weights, weighted_mean, weighted_rate, wilson
 from rss_shield.shield.verdicts import AT_FAULT, BLAMES
 
 # Okabe & Ito's colours, told apart with every common colour blindness
-ARM_COLOURS = {"unshielded": "#D55E00", "shielded": "#0072B2"}
 BLAME_COLOURS = {
     "ego": "#D55E00",
     "both": "#E69F00",
@@ -62,12 +62,12 @@ def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
         figure = Figure(figsize=(6.5, 4.6))
         for axes, (name, values, statistic) in zip(figure.subplots(2, 2, sharex=True).flat, panels, strict=True):
             for arm, rows in curve.groupby("arm", sort=False):
-                label = f"{arm} (n = {len(rows)} episodes, {_seeds(rows['train_seed'].nunique())})"
+                label = f"{arm} (n = {len(rows)} episodes, {seeds_text(rows['train_seed'].nunique())})"
                 points = [
                     ((low + high) / 2, _point(statistic, values[inside.index], inside))
                     for low, high, inside in bins[arm]
                 ]
-                _line(axes, points, label, ARM_COLOURS.get(str(arm), "#009E73"))
+                _line(axes, points, label, str(arm))
             axes.set_title(name, loc="left")
             if name != "Return per episode":
                 axes.yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -80,7 +80,7 @@ def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
             "point: all episodes begun in its bin, those cut off weighted in; band: 95 % interval over these episodes"
         )
         figure.suptitle(f"{title}: training\n({explained})", size=8)
-        _save(figure, folder / "learning_curve")
+        save(figure, folder / "learning_curve")
 
 
 def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
@@ -95,7 +95,7 @@ def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
     """
     cells = list(episodes.groupby(["train", "test"], sort=False))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(6.5, 4.0))
+        figure = Figure(figsize=(max(6.5, 1.2 * len(cells)), 4.0))
         axes = figure.subplots()
         tops = np.zeros(len(cells))
         for blame in BLAMES:
@@ -126,7 +126,7 @@ def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
         figure.legend(title="Who broke their duty", loc="outside lower center", ncols=len(BLAMES))
         whiskers = "whiskers: 95 % Wilson intervals over episodes; left: ego or both, right: all"
         figure.suptitle(f"{title}: who is to blame ({whiskers})", size=9)
-        _save(figure, folder / "blame")
+        save(figure, folder / "blame")
 
 
 def _blamed(cell: pd.DataFrame, blame: str) -> pd.Series:
@@ -174,10 +174,17 @@ def _point(statistic: Callable[..., Interval], values: pd.Series, inside: pd.Dat
     return known._replace(value=np.nan)
 
 
-def _line(axes: Axes, points: list[tuple[float, Interval]], label: str, colour: str) -> None:
-    x = [centre for centre, _ in points]
-    axes.plot(x, [p.value for _, p in points], color=colour, marker="o", markersize=3, label=label)
-    axes.fill_between(x, [p.low for _, p in points], [p.high for _, p in points], color=colour, alpha=0.2, linewidth=0)
+def _line(axes: Axes, points: list[tuple[float, Interval]], label: str, arm: str) -> None:
+    x, style = [centre for centre, _ in points], style_of(arm)
+    axes.plot(x, [p.value for _, p in points], markersize=3, label=label, **style)
+    low, high = [p.low for _, p in points], [p.high for _, p in points]
+    axes.fill_between(x, low, high, color=style["color"], alpha=0.2, linewidth=0)
+
+
+def style_of(arm: str) -> dict[str, Any]:
+    """Colour and marker of an arm, so that more arms than colours are told apart."""
+    markers = "osD^v<>pPXhd"
+    return {"color": ARMS[arm].colour, "marker": markers[list(ARMS).index(arm) // 2 % len(markers)]}
 
 
 def _whisker(axes: Axes, x: float, interval: Interval) -> None:
@@ -185,11 +192,12 @@ def _whisker(axes: Axes, x: float, interval: Interval) -> None:
     axes.errorbar(x, interval.value, [[below], [above]], color="black", capsize=2.5, linewidth=0.9, fmt="none")
 
 
-def _seeds(count: int) -> str:
+def seeds_text(count: int) -> str:
     return f"{count} seed" if count == 1 else f"{count} seeds"
 
 
-def _save(figure: Figure, stem: Path) -> None:
+def save(figure: Figure, stem: Path) -> None:
+    """As PNG and PDF; the same data give the same file."""
     for kind in ("png", "pdf"):
         with atomic(stem.with_suffix(f".{kind}")) as temporary:
             # a fixed date: the same data give the same file

@@ -5,44 +5,50 @@
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from rich.console import Console
 
+from rss_shield.eval import removal
+from rss_shield.eval.arms import Arm, arm_named
+from rss_shield.eval.cards import write_card
 from rss_shield.eval.files import atomic, write_json
+from rss_shield.eval.frontier import plot_frontier
 from rss_shield.eval.metrics import differences, summarise
 from rss_shield.eval.plots import plot_blame, plot_learning_curve
 from rss_shield.eval.replay import compare, verdict
 from rss_shield.eval.run_folder import changes
 from rss_shield.eval.table import print_table, write_table
 
-SHIELD = {"unshielded": "off", "shielded": "on"}  # arm -> shield while training
 _PLACE = {"line": "at the line", "anywhere": "anywhere"}
 
 
 def write_report(folder: Path) -> None:
     """Read episodes/*.csv, replays/*.csv and */learning_curve.csv of a run; print and write table, figures, results.
 
-    Writes episodes.csv, results.json, table.txt, .md, .tex and .csv, learning_curve.png and .pdf,
-    blame.png and .pdf; replays.csv if episodes were replayed.
+    Writes episodes.csv, results.json, table.txt, .md, .tex and .csv, learning_curve.png and .pdf, removal.png and .pdf,
+    blame.png and .pdf, the cards of the models; frontier.png and .pdf with more than two arms; replays.csv if episodes
+    were replayed.
     """
-    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
-    arms, seeds = config["arms"], config["seeds"]
-    cells = [(arm, seed, test) for arm in arms for test in ("off", "on") for seed in seeds]
+    run = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    config = run["config"]
+    arms, seeds = [arm_named(name) for name in config["arms"]], config["seeds"]
+    models = [(arm.name, seed) for arm in arms if not arm.scripted for seed in seeds]
+    cells = [
+        (arm.name, seed, test) for arm in arms for test in arm.tests for seed in (seeds[:1] if arm.scripted else seeds)
+    ]
     episodes = pd.concat(
         [read_cell(cell_path(folder, *cell)) for cell in cells],
         ignore_index=True,
     )
-    curve = pd.concat(
-        [
-            read_cell(folder / f"{arm}-seed{seed}" / "learning_curve.csv").assign(arm=arm, train_seed=seed)
-            for arm in arms
-            for seed in seeds
-        ],
-        ignore_index=True,
-    )
+    curves = [
+        read_cell(folder / f"{arm}-seed{seed}" / "learning_curve.csv").assign(arm=arm, train_seed=seed)
+        for arm, seed in models
+    ]
+    removals = removal.read_all(folder, models)
     replayed = [path for path in (replay_path(folder, *cell) for cell in cells) if path.exists()]
     compared = compare(episodes, pd.concat(map(read_cell, replayed), ignore_index=True)) if replayed else None
     note = "" if compared is None else verdict(compared)
@@ -63,14 +69,26 @@ def write_report(folder: Path) -> None:
     )
     n_seeds = f"{len(seeds)} training seed" + ("s" if len(seeds) > 1 else "")
     title = (
-        f"PPO on {config['env_id']}{_given('config', config['config'])}, RSS preset {config['preset']}"
+        f"{_who(arms)} on {config['env_id']}{_given('config', config['config'])}, RSS preset {config['preset']}"
         f"{_given('ego', config['ego'])}{_given('other', config['other'])}, {_conduct(config)}"
         f"{config['total_timesteps']} timesteps per arm, {_penalty(config)}, {n_seeds}"
     )
+    for arm, seed in models:
+        of_model = (episodes["train"] == arm_named(arm).called) & (episodes["train_seed"] == seed)
+        write_card(folder / f"{arm}-seed{seed}", arm, seed, run, episodes[of_model])
     write_table(summary, folder, title, note)
-    plot_learning_curve(curve, folder, str(config["env_id"]))
+    if curves:
+        plot_learning_curve(pd.concat(curves, ignore_index=True), folder, str(config["env_id"]))
+    if len(arms) > 2:
+        plot_frontier(summary, folder, str(config["env_id"]))
+    if len(removals):
+        removal.plot_removal(removals, folder, str(config["env_id"]))
     plot_blame(episodes, folder, str(config["env_id"]))
     print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160), note)
+
+
+def _who(arms: Sequence[Arm]) -> str:
+    return "PPO" if all(arm.learner == "ppo" for arm in arms) else "Agents"
 
 
 def _given(option: str, values: dict[str, Any]) -> str:
@@ -104,7 +122,7 @@ def replay_path(folder: Path, arm: str, seed: int, test: str) -> Path:
 
 def write_cell(path: Path, episodes: pd.DataFrame, arm: str, seed: int, test: str) -> None:
     path.parent.mkdir(exist_ok=True)
-    labelled = episodes.assign(train=SHIELD[arm], test=test, train_seed=seed)
+    labelled = episodes.assign(train=arm_named(arm).called, test=test, train_seed=seed)
     with atomic(path) as temporary:
         labelled.to_csv(temporary, index=False)
 

@@ -22,11 +22,12 @@ Policy = Callable[[Any], Any]  # observation -> action
 
 def evaluate(
     make_vec: Callable[[int], Any],
-    policy: Callable[[np.ndarray], np.ndarray],
+    policy: Callable[..., np.ndarray],
     seeds: Sequence[int],
     *,
     n_envs: int = 1,
     keep_actions: bool = True,
+    masked: bool = False,
     progress: Callable[[int], None] = lambda episodes: None,
     more: Callable[[Any, int], dict[str, Any]] = lambda env, e: {},
 ) -> pd.DataFrame:
@@ -42,6 +43,7 @@ def evaluate(
       seeds: one per episode.
       n_envs: E.
       keep_actions: fill the column "actions"; they must be whole numbers.
+      masked: the policy gets `action_masks()` of the environments `[E, A]` as a second argument.
       progress: called with the episodes done so far.
       more: further columns, of environment `e` of `env`, whose episode has just ended.
 
@@ -58,7 +60,7 @@ def evaluate(
     try:
         observations, _ = env.reset(seed=[int(seed) for seed in seeds[:envs]])
         while len(records) < len(seeds):
-            chosen = policy(observations)
+            chosen = policy(observations, _masks(env)) if masked else policy(observations)
             observations, rewards, terminated, truncated, infos = env.step(chosen)
             returns += rewards
             speeds += infos["speed"]
@@ -80,6 +82,11 @@ def evaluate(
     finally:
         env.close()
     return pd.DataFrame([records[i] for i in range(len(seeds))])
+
+
+def _masks(env: Any) -> np.ndarray:
+    """`action_masks()` of all environments, `[E, A]`: of the engine at once, of others one after the other."""
+    return env.action_masks() if hasattr(env, "action_masks") else np.stack(env.call("action_masks"))
 
 
 def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:

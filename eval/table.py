@@ -14,14 +14,15 @@ from rss_shield.eval.files import atomic, write_text
 from rss_shield.eval.metrics import metrics_in
 
 LEGEND = (
-    "train, test: shield off or on. crash (% of the n test episodes) = ego at fault + other at fault + inherited (the "
-    "episode began in that danger) + none (unexplained: a bug). overridden: % of simulation frames on which a duty "
-    "changed the command; anticipated: on which no duty did, but anticipation; change: of the acceleration, mean size "
-    "over the frames. length: decisions. min TTC: smallest time to collision, median of the episodes. rms jerk: along "
-    "the car; hard braking: % of frames below -3 m/s²; comfortable: % inside nuPlan's bounds of acceleration, jerk, "
-    "lateral and yaw acceleration; min time gap: to the car ahead, median. [low, high]: 95 % interval over test "
-    "episodes of these trained models (rates Wilson, others bootstrap). (low, high): the same over training seeds, so "
-    "what other seeds may give (Student's t of the seeds' values, at least as wide as the first; – for a single seed)."
+    "train: shield off or on while PPO was trained, or the name of another arm; test: shield off or on. crash (% of "
+    "the n test episodes) = ego at fault + other at fault + inherited (the episode began in that danger) + none "
+    "(unexplained: a bug). overridden: % of simulation frames on which a duty changed the command; anticipated: on "
+    "which no duty did, but anticipation; change: of the acceleration, mean size over the frames. length: decisions. "
+    "min TTC: smallest time to collision, median of the episodes. rms jerk: along the car; hard braking: % of frames "
+    "below -3 m/s²; comfortable: % inside nuPlan's bounds of acceleration, jerk, lateral and yaw acceleration; min "
+    "time gap: to the car ahead, median. [low, high]: 95 % interval over test episodes of these trained models (rates "
+    "Wilson, others bootstrap). (low, high): the same over training seeds, so what other seeds may give (Student's t "
+    "of the seeds' values, at least as wide as the first; – for a single seed)."
 )
 MOST_DIGITS = 9  # what is closer to a limit is at the limit
 GOAL_LEGEND = (
@@ -87,15 +88,31 @@ def print_table(summary: pd.DataFrame, title: str, console: Console, note: str =
     """Print the table, its legend and a note; on a narrow terminal the cells become the columns."""
     frame = table_frame(summary)
     table = _rich(frame, title)
-    unbounded = console.options.update(max_width=10_000)
-    if console.measure(table, options=unbounded).maximum > console.width:
+    tables = [table]
+    if not _fits(table, console):
         cells = frame["train"] + " / " + frame["test"]
         turned = frame.drop(columns=["train", "test"]).set_axis(cells).T
-        table = _rich(turned.rename_axis("train / test", axis=0).reset_index(), title)
-    console.print(table)
+        tables = _side_by_side(turned, title, console)
+    for table in tables:
+        console.print(table)
     console.print(legend(summary), markup=False, highlight=False)
     if note:
         console.print("\n" + note, markup=False, highlight=False)
+
+
+def _side_by_side(turned: pd.DataFrame, title: str, console: Console) -> list[Table]:
+    """One cell a column, as many columns in a table as the console is wide."""
+    for count in range(len(turned.columns), 0, -1):
+        parts = [turned.iloc[:, first : first + count] for first in range(0, len(turned.columns), count)]
+        tables = [_rich(part.rename_axis("train / test", axis=0).reset_index(), title) for part in parts]
+        if all(_fits(table, console) for table in tables):
+            break
+    return tables
+
+
+def _fits(table: Table, console: Console) -> bool:
+    unbounded = console.options.update(max_width=10_000)
+    return console.measure(table, options=unbounded).maximum <= console.width
 
 
 def _rich(frame: pd.DataFrame, title: str) -> Table:

@@ -5,7 +5,10 @@ import sys
 
 from rss_shield.eval.interrupt import stop_on_interrupt
 
-COMMANDS = {"train": ("rss_shield.train", "train", "train with and without the shield, test, compare")}
+COMMANDS = {
+    "train": ("rss_shield.train", "train", "train with and without the shield, test, compare"),
+    "test": ("rss_shield.test", "train", "test a model or a policy with the shield and without"),
+}
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"
 
 

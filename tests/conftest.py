@@ -12,6 +12,7 @@ from rss_shield.envs.stock import drivers_unchanged
 # whole episodes, many of them, or new processes: left out by `make test-fast`
 SLOW = frozenset(
     [
+        "agents/test_baselines",
         "agents/test_ppo",
         "envs/test_arguments",
         "envs/test_backing_up",
@@ -66,8 +67,10 @@ SLOW = frozenset(
         "shield/test_theorems",
         "shield/test_comfort",
         "shield/test_def18_junction_response",
+        "test_campaign",
         "test_install",
         "test_pages",
+        "test_test_command",
         "test_train_cli",
     ]
 )

@@ -11,7 +11,7 @@ from places import ROOT
 LIBRARIES = {
     "shield": {"numpy", "numba"},
     "envs": {"gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo"},
-    "agents": {"gymnasium", "stable_baselines3", "torch", "numpy"},
+    "agents": {"gymnasium", "sb3_contrib", "stable_baselines3", "torch", "numpy"},
     "eval": {"numpy", "scipy", "pandas", "matplotlib", "rich", "tqdm", "llvmlite", "yaml"},
 }
 # part -> parts that it may import, itself left out; a part is a folder, or the modules that lie in it directly

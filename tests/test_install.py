@@ -9,7 +9,16 @@ import tomllib
 import pytest
 from places import ROOT
 
-TRAINING = ("torch", "stable_baselines3", "tensorboard", "tyro", "rich", "tqdm", "yaml")  # not needed otherwise
+TRAINING = (
+    "torch",
+    "stable_baselines3",
+    "sb3_contrib",
+    "tensorboard",
+    "tyro",
+    "rich",
+    "tqdm",
+    "yaml",
+)  # not needed otherwise
 FOREIGN = ("envs", "agents", "eval", "shield", "train")
 USE = """
 import importlib.abc, sys
@@ -101,7 +110,7 @@ def test_the_command_is_the_script(site, tmp_path):
     script = subprocess.run([sys.executable, ROOT / "train.py", "--help"], capture_output=True, text=True, cwd=tmp_path)
     assert command.stdout == script.stdout != "", command.stderr
     unknown = python(tmp_path, "from rss_shield.cli import main; main(['trian'])", site)
-    assert unknown.stderr.strip() == "rss-shield: unknown command 'trian'; expected one of train"
+    assert unknown.stderr.strip() == "rss-shield: unknown command 'trian'; expected one of train, test"
 
 
 def test_this_environment_has_it_under_its_one_name(tmp_path):

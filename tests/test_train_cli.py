@@ -49,8 +49,12 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
     ("arguments", "message"),
     [
         ("--backend slow", "--backend slow is out of range: expected one of fast, highway-env"),
-        ("--arms foo", "--arms foo is out of range: expected one or more of unshielded, shielded"),
-        ("--arms shielded shielded", "--arms shielded shielded is out of range: expected one or more of"),
+        ("--arms foo", "--arms: 'foo' is no arm; the nearest is "),
+        ("--arms shielded adaptive-penaltie", "'adaptive-penaltie' is no arm; the nearest is adaptive-penalty, --list"),
+        ("--arms shielded shielded", "--arms shielded shielded is out of range: expected one or more different"),
+        ("--cost-limit 2", "--cost-limit 2.0 is out of range: expected 0 to 1"),
+        ("--target-intervention -1", "--target-intervention -1.0 is out of range: expected a number >= 0"),
+        ("--removal-checks -1", "--removal-checks -1 is out of range: expected at least 0"),
         ("--total-timesteps 0", "--total-timesteps 0 is out of range: expected at least 1"),
         ("--total-timesteps many", "--total-timesteps: invalid literal for int() with base 10: 'many'"),
         ("--seeds", "--seeds  is out of range: expected different whole numbers, 0 to 2**32 - 1"),
@@ -204,6 +208,8 @@ def test_a_run_writes_everything_a_paper_needs(finished):
         "learning_curve.pdf",
         "blame.png",
         "blame.pdf",
+        "removal.png",
+        "removal.pdf",
         "unshielded-seed0",
         "shielded-seed0",
     }

@@ -10,8 +10,10 @@ from stable_baselines3 import PPO
 
 import rss_shield
 import rss_shield.agents.ppo
+from rss_shield.agents.blocks import block_seed, train_in_blocks
 from rss_shield.agents.curve import COLUMNS, truncate_curve
-from rss_shield.agents.ppo import block_seed, load_policy, rollout_steps, rounded_timesteps, train
+from rss_shield.agents.load import load_policy
+from rss_shield.agents.ppo import learner, rollout_steps
 from tests.fake_env import BRAKE, FakeEnv, fake_vec
 
 
@@ -23,6 +25,10 @@ def small_rollouts(monkeypatch):
 
 class Killed(Exception):
     pass
+
+
+def train(make_vec, folder, **options):
+    return train_in_blocks(learner(), make_vec, folder, **options)
 
 
 def weights(path) -> torch.Tensor:
@@ -142,7 +148,7 @@ def test_batches_are_equal_and_totals_are_whole_rollouts(monkeypatch, n_envs, to
     rollout = n_envs * rollout_steps(n_envs, total)
     assert rollout % rss_shield.agents.ppo.BATCHES == 0
     assert rollout <= max(8192, rss_shield.agents.ppo.BATCHES * n_envs)
-    assert total <= rounded_timesteps(n_envs, total) < total + rollout
+    assert total <= learner().rounded(n_envs, total) < total + rollout
 
 
 def test_blocks_have_different_seeds_that_leave_room_for_test_seeds():

@@ -17,7 +17,8 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 import rss_shield.agents.curve
 import rss_shield.agents.ppo
 import rss_shield.eval.rollout
-from rss_shield.agents.ppo import train
+from rss_shield.agents.blocks import train_in_blocks
+from rss_shield.agents.ppo import learner
 from rss_shield.eval.plots import joined_bins
 from rss_shield.eval.stats import completion_weights, weighted_mean, weighted_rate
 
@@ -173,8 +174,8 @@ def test_a_real_training_gives_the_true_crash_rate(process, truth, tmp_path, mon
     monkeypatch.setattr(rss_shield.agents.ppo, "ROLLOUT_STEPS", 512)
     monkeypatch.setattr(rss_shield.agents.ppo, "ROLLOUTS_PER_BLOCK", 3)
 
-    train(
-        partial(process_vec, process), tmp_path, seed=2, total_timesteps=512 * 10, n_envs=32
+    train_in_blocks(
+        learner(), partial(process_vec, process), tmp_path, seed=2, total_timesteps=512 * 10, n_envs=32
     )  # blocks of 48, 48, 48, 16 decisions
     curve = pd.read_csv(tmp_path / "learning_curve.csv")
     decisions = curve["length"].sum()
@@ -192,7 +193,7 @@ def test_a_real_training_gives_the_true_crash_rate(process, truth, tmp_path, mon
 
 def test_tensorboard_gets_rates_per_decision(tmp_path, monkeypatch):
     monkeypatch.setattr(rss_shield.agents.ppo, "ROLLOUT_STEPS", 512)
-    train(partial(process_vec, hazard), tmp_path, seed=2, total_timesteps=5120, n_envs=32)
+    train_in_blocks(learner(), partial(process_vec, hazard), tmp_path, seed=2, total_timesteps=5120, n_envs=32)
     events = EventAccumulator(str(tmp_path / "tensorboard"))
     events.Reload()
     crashes = [event.value for event in events.Scalars("decision/crashes")]

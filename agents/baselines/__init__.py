@@ -1,0 +1,1 @@
+"""Learners beside PPO, one file each: `learner(**settings)` returns a `Learner`."""

@@ -1,0 +1,44 @@
+"""DQN (Mnih et al. 2015), as highway-env's own examples use it."""
+
+from typing import Any
+
+from stable_baselines3 import DQN
+
+from rss_shield.agents import off_policy
+from rss_shield.agents.learner import Learner
+
+LEARNING_RATE = 5e-4
+TARGET_UPDATES = 1024  # decisions from one target network to the next
+
+
+def learner() -> Learner:
+    """DQN."""
+    return learner_with(SinglyDQN, options)
+
+
+def learner_with(algorithm: type, given: Any) -> Learner:
+    """A Q-learner with a replay buffer."""
+    return Learner(
+        algorithm,
+        given,
+        off_policy.rollout,
+        off_policy.rollouts_per_block,
+        begin_block=off_policy.explore_less,
+        notes={
+            "exploration": f"{off_policy.EPSILON:g} to {off_policy.LEAST_EPSILON:g} over {off_policy.EXPLORES:.0%} of "
+            "the decisions, block by block, drawn in every environment"
+        },
+    )
+
+
+def options(n_envs: int, total_timesteps: int) -> dict[str, Any]:
+    return {
+        **off_policy.options(n_envs, total_timesteps),
+        "policy_kwargs": {"net_arch": [128, 128]},
+        "learning_rate": LEARNING_RATE,
+        "target_update_interval": max(TARGET_UPDATES, n_envs),
+    }
+
+
+class SinglyDQN(off_policy.ExploresSingly, DQN):
+    """DQN of stable-baselines3 whose environments explore one by one."""

@@ -1,0 +1,65 @@
+"""What learners from a replay buffer have in common: few gradient steps per decision, and blocks of decisions.
+
+A block lasts about BLOCK decisions. Rates that fall while a training goes on are set at its beginning. The buffer is
+saved with the model, so nothing is lost when a training is killed, and a resumed one gives the same result.
+"""
+
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.utils import FloatSchedule
+
+BLOCK = 8192  # decisions
+BUFFER = 100_000  # decisions
+BATCH = 128
+DECISIONS_PER_UPDATE = 8
+GAMMA = 0.9
+# of the exploration of Q-learners
+EPSILON, LEAST_EPSILON, EXPLORES = 1.0, 0.05, 0.3  # at first, in the end, and after which share of the decisions
+
+
+def rollout(n_envs: int, total_timesteps: int) -> int:
+    """A training is a multiple of one step of all environments."""
+    return n_envs
+
+
+def rollouts_per_block(n_envs: int) -> int:
+    return max(BLOCK // n_envs, 1)
+
+
+def options(n_envs: int, total_timesteps: int) -> dict[str, Any]:
+    """What differs from the defaults of stable-baselines3, for learners with a replay buffer."""
+    return {
+        "buffer_size": min(BUFFER, max(total_timesteps, n_envs)),
+        "batch_size": BATCH,
+        "learning_starts": max(min(1000, total_timesteps // 10), n_envs),
+        "train_freq": 1,  # step of all environments
+        "gradient_steps": max(n_envs // DECISIONS_PER_UPDATE, 1),
+        "gamma": GAMMA,
+    }
+
+
+def explore_less(model: Any, total_timesteps: int) -> None:
+    """The share of random actions in the next block."""
+    done = min(model.num_timesteps / (EXPLORES * total_timesteps), 1.0)
+    model.exploration_schedule = FloatSchedule(EPSILON + done * (LEAST_EPSILON - EPSILON))
+    model.exploration_rate = model.exploration_schedule(1.0)
+
+
+class ExploresSingly:
+    """Before a Q-learner of stable-baselines3: every environment draws for itself whether it explores.
+
+    Theirs draws once for all.
+    """
+
+    exploration_rate: float
+    action_space: Any
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        actions, state = super().predict(observation, state, episode_start, True)  # type: ignore[misc]
+        if deterministic or np.ndim(actions) == 0:
+            return actions, state
+        count = len(actions)  # torch's generator is seeded by `set_random_seed`
+        explores = torch.rand(count).numpy() < self.exploration_rate
+        return np.where(explores, torch.randint(int(self.action_space.n), (count,)).numpy(), actions), state

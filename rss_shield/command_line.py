@@ -1,0 +1,59 @@
+"""What the console commands have in common: options from a dataclass, and mistakes that end in one line."""
+
+import contextlib
+import io
+import json
+import re
+import sys
+from typing import Annotated, Any, NoReturn, TypeVar
+
+import tyro
+
+from rss_shield.eval.config_option import read_config
+
+T = TypeVar("T")
+# a file is read where the command line is
+ConfigFile = Annotated[
+    dict[str, Any],
+    tyro.constructors.PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="FILE",
+        instance_from_str=lambda texts: read_config(texts[0]),
+        is_instance=lambda value: isinstance(value, dict),
+        str_from_instance=lambda value: [json.dumps(value)],
+    ),
+]
+
+
+def parsed(kind: type[T], prog: str, description: str, arguments: list[str], default: T | None = None) -> T:
+    """Read a command line. What cannot be read ends in one line and exit code 2."""
+    printed = io.StringIO()
+    given: dict[str, Any] = {} if default is None else {"default": default}
+    try:
+        with contextlib.redirect_stderr(printed):
+            return tyro.cli(
+                kind,
+                prog=prog,
+                description=description,
+                args=arguments,
+                config=(tyro.conf.FlagCreatePairsOff,),
+                **given,
+            )
+    except SystemExit as stop:
+        if not stop.code:  # --help
+            raise
+        _, *box = (line.strip("│| ") for line in printed.getvalue().splitlines() if line.strip())
+        message = " ".join(line for line in box if line.strip("─-╰╯+"))
+        fail(prog, re.split("Argument helptext|For full helptext", message)[0] + f"(see {prog} --help)")
+
+
+def fail(prog: str, message: str) -> NoReturn:
+    print(f"{prog}: error: {' '.join(message.split())}", file=sys.stderr)
+    raise SystemExit(2)
+
+
+def shown(value: Any, separator: str = " ") -> str:
+    """A value as on a command line."""
+    if value is None:
+        return "(not given)"
+    return separator.join(map(str, value)) if isinstance(value, list | tuple) else str(value)
