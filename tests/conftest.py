@@ -27,6 +27,7 @@ SLOW = frozenset(
         "envs/test_multi_agent",
         "envs/test_parallel_env",
         "envs/test_random_roads",
+        "envs/test_recorder",
         "envs/test_roads",
         "envs/test_several_contacts",
         "envs/test_shielded_traffic",

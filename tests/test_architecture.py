@@ -17,12 +17,13 @@ LIBRARIES = {
 # part -> parts that it may import, itself left out; a part is a folder, or the modules that lie in it directly
 LAWS = {"shield.definitions", "shield.params", "shield._numba"}
 OWES = {"shield.geometry", "shield.command", "shield.chosen", "shield.anything", "shield.comfort"}
-BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions"}
+BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions", "shield.trace"}
 ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
 ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
 MAY_IMPORT = {
     "shield._numba": set(),
     "shield.params": set(),
+    "shield.trace": set(),
     "shield.definitions": LAWS | {"shield.anything", "shield.geometry"},
     "shield.risk": LAWS | OWES,
     "shield.lanes": LAWS | OWES,

@@ -53,6 +53,19 @@ class Frame(NamedTuple):
     users_before: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` likewise
 
 
+class Look(NamedTuple):
+    """What a shield made of the last frame, for whoever films the episode."""
+
+    wish: Command  # of the ego's own controller
+    command: Command  # that was executed
+    overridden: bool
+    anticipated: bool
+    limited: bool
+    response: int  # sum of RESPONSE_*
+    partner: int  # index among `ShieldedEgo.others` of who is nearest to danger, or in the way; -1 = nobody
+    dangerous: bool
+
+
 def log_of(frames: list[Frame]) -> Log:
     """Recorded frames as the arrays that `shield.lanes.judge.audit` reads."""
     count = 1 + max((max(frame.keys, default=-1) for frame in frames), default=-1)
@@ -133,6 +146,7 @@ class ShieldedEgo:
         self.min_ttc = float("inf")
         self.tally = StepTally()
         self.record: list[Frame] | None = [] if record else None
+        self.look: Look | None = None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
         self.judge = self  # or another, which watches by a table of its own
         vehicle.act = self.act
@@ -194,6 +208,7 @@ class ShieldedEgo:
             vehicle.action = dict(nominal)
         before, self.last = self.last, (ego, users)
         changes = command.acceleration - wish.acceleration, steered - steering
+        self.look = Look(wish, command, *response[1:], danger.response, danger.partner, pairs > 0)
         self._count(danger, response, response.anticipated, pairs, broken, *changes)
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.dt)
         tally = self.tally

@@ -169,6 +169,11 @@ def _links(network: Any, index: LaneIndex, shift: float, forward: bool, way: Way
     return [min(aside, key=lambda one: one[:2])[2]]
 
 
+def successors(network: Any, index: LaneIndex) -> list[LaneIndex]:
+    """Lanes that go on where a lane ends; where it just ends, the nearest one beside it."""
+    return [link for link, _, _ in _links(network, index, 0.0, True, ())]
+
+
 def _roads_at(network: Any, index: LaneIndex, forward: bool) -> list[tuple[str, str]]:
     """Roads that start where a lane ends, or that end where it starts."""
     if forward:
