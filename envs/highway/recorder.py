@@ -85,6 +85,9 @@ class Film:
         self.paths: list[np.ndarray] = []
         self.path_number: dict[tuple[int, int], int] = {}
         self.routes: list[list[Any]] = []
+        self.announced: dict[int, Any] = {}  # the last of them, by row
+        self.rights: dict[int, list[Any]] = {}  # by row
+        self.clock = float(getattr(self.road, "clock", 0.0))  # of the lights
         self.events: list[Event] = []
         self.contacts: dict[int, Contact] = {}
         for ego in inner.controlled_vehicles:
@@ -114,6 +117,9 @@ class Film:
 
     def _take_sample(self) -> None:
         self.samples.append({self._row_of(v): self._state(v) for v in self._everybody()})
+        for vehicle in self.road.vehicles:
+            self._note_route(vehicle)
+            self._note_right(vehicle)
         if isinstance(self.road, SignalisedRoad):
             self.signals.append(tuple(_SIGNALS[self.road.signal(k)] for k in range(4)))
 
@@ -129,6 +135,21 @@ class Film:
     def _state(self, v: Any) -> tuple[float, ...]:
         lane = self.lane_number.get(getattr(v, "lane_index", None) or (), -1)
         return (*map(float, v.position), float(v.heading), float(v.speed), float(v.crashed), lane)
+
+    def _note_right(self, vehicle: Any) -> None:
+        """May a vehicle that has just been seen first pass its line? That depends on what was before."""
+        row = self._row_of(vehicle)
+        if row not in self.rights and hasattr(vehicle, "has_right"):
+            self.rights[row] = [int(vehicle.approach), bool(vehicle.has_right), bool(vehicle.ran_red_light)]
+
+    def _note_route(self, vehicle: Any) -> None:
+        """Lane that a driver heads for, "" = it is steered freely, and the roads of its route: noted when they change."""
+        row, target = self._row_of(vehicle), getattr(vehicle, "target_lane_index", None)
+        announced = target, tuple(step[:2] for step in getattr(vehicle, "route", None) or [])
+        if self.announced.get(row) != announced:
+            self.announced[row] = announced
+            route = [list(road) for road in announced[1]]
+            self.routes.append([len(self.samples) - 1, row, lane_id(target) if target else "", route])
 
     def _film_of(self, vehicle: Any) -> "_EgoFilm":
         return self.egos.setdefault(self._row_of(vehicle), _EgoFilm(vehicle))
@@ -221,6 +242,8 @@ class Film:
             "shielded": [row for row, user in enumerate(self.users) if "act" in vars(user)],
             "mode": "off",
         }
+        if isinstance(self.road, SignalisedRoad):
+            meta |= {"clock": self.clock, "rights": self.rights}
         if shield is not None:
             judge = shield._judge or shield.settings
             meta |= {
@@ -233,6 +256,8 @@ class Film:
                 "conduct": {name: getattr(shield.options, name) for name in ("entry", "intent", "waiting", "examine")},
                 "traffic": shield.options.traffic,
                 "blame": info.get("blame", ""),
+                "dangerous_pairs": info.get("episode_dangerous_pairs", 0),
+                "broken_duties": info.get("episode_broken_duties", 0),
             }
         return meta
 
@@ -245,12 +270,10 @@ class _EgoFilm:
         self.frames = -1  # that its shield had counted by the last look
         self.seen: dict[int, dict[str, Any]] = {}  # by sample
         self.refused: Any = None  # tally of the decision of which a refusal has been noted
-        self.route: Any = None
 
     def look(self, film: Film) -> None:
         """To be called on a frame on which the shield has decided, before anybody moves."""
         t = len(film.samples) - 1
-        self._note_route(film, t)
         shield = shield_on(self.vehicle)
         if shield is None or shield.look is None or shield.frames == self.frames:
             return
@@ -274,14 +297,6 @@ class _EgoFilm:
         if shield.tally.lane_change_refused and self.refused is not shield.tally:
             self.refused = shield.tally
             film.events.append(Event(t * film.dt, "lane change refused", film._row_of(self.vehicle)))
-
-    def _note_route(self, film: Film, t: int) -> None:
-        vehicle = self.vehicle
-        target = getattr(vehicle, "target_lane_index", None)
-        route = [list(step[:2]) for step in getattr(vehicle, "route", None) or []]
-        if (target, route) != self.route:
-            self.route = (target, route)
-            film.routes.append([t, film._row_of(vehicle), lane_id(target) if target else "", route])
 
     def ego(self, row: int, film: Film) -> Ego:
         """Everything as arrays."""

@@ -61,12 +61,13 @@ NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")
 AT_FAULT = ("ego", "both")  # verdicts that charge the ego
 
-_NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
+NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
 
 
 @inner
-def _blame_ego(memory, duty, excess):
+def blame_ego(memory, duty, excess):
+    """Note that the ego broke a duty, if it did; the first one counts, and the most that it was broken by."""
     if excess > _TOLERANCE:
         if memory.ego_broke == KEPT:
             memory.ego_broke = duty
@@ -108,16 +109,16 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
             sign = 1.0 if memory.ego_is_rear else -1.0
             b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, ego_params, other_params)
             share = _share_toward(sign * memory.v_ego, ego_params, b_ego, dt)
-            _blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
+            blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
             share = _share_toward(-sign * memory.v_other, other_params, b_other, dt)
             _blame_other(memory, TOO_FAR, -sign * travel_other + longer_other - share)
         elif memory.ego_is_rear:
-            _blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, ego_params, dt))
+            blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, ego_params, dt))
             share = _share_front(tau, memory.v_other, other_params, dt)
             _blame_other(memory, TOO_SHORT, share - travel_other + longer_other)
         else:
             share = _share_front(tau, memory.v_ego, ego_params, dt) - memory.way_back
-            _blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
+            blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
             share = _share_rear(tau, memory.v_other, other_params, dt)
             _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
         if ahead == 0 and memory.age > 1 and not user.wreck:
@@ -133,7 +134,7 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
     if owes(memory, LAT):
         used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * step
         share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
-        _blame_ego(memory, TOO_CLOSE, used - share - slack)
+        blame_ego(memory, TOO_CLOSE, used - share - slack)
         used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * step
         # a driver may already use the first frame's growth on it; mu has room for that
         first_frame = other_params.a_lat_max_accel * dt**2
@@ -238,9 +239,9 @@ def judge_frame(ego, users, memory, command, curvature, ego_params, other_params
     for a in range(how_many(who, users)):
         i = which(who, a)
         if memory[i].since > 0:
-            judge_motion(memory[i], ego, users[i], ego_params, other_params, _NOW, 0.0, dt)
+            judge_motion(memory[i], ego, users[i], ego_params, other_params, NOW, 0.0, dt)
             duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
-            _blame_ego(memory[i], duty, excess)
+            blame_ego(memory[i], duty, excess)
             pairs += 1
             broken += duty != KEPT
     return pairs, broken
@@ -274,7 +275,7 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     pair = assess(ego, user, ego_params, other_params, rules, dt)
     remember(memory, pair, ego, user, dt)
     if memory.since > 0:
-        judge_motion(memory, ego, user, ego_params, other_params, _NOW, 0.0, dt)
+        judge_motion(memory, ego, user, ego_params, other_params, NOW, 0.0, dt)
         # the simulator predicts contacts one frame ahead
         judge_motion(memory, ego, user, ego_params, other_params, _NEXT_FRAME, rules.overlap_margin, dt)
     ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
