@@ -87,6 +87,7 @@ class Film:
         self.routes: list[list[Any]] = []
         self.announced: dict[int, Any] = {}  # the last of them, by row
         self.rights: dict[int, list[Any]] = {}  # by row
+        self.hit: dict[int, int] = {}  # sample at which the simulator says first that there is contact, or will be
         self.clock = float(getattr(self.road, "clock", 0.0))  # of the lights
         self.events: list[Event] = []
         self.contacts: dict[int, Contact] = {}
@@ -120,6 +121,9 @@ class Film:
         for vehicle in self.road.vehicles:
             self._note_route(vehicle)
             self._note_right(vehicle)
+        for user in self._everybody():
+            if user.crashed or getattr(user, "impact", None) is not None:
+                self.hit.setdefault(self._row_of(user), len(self.samples) - 1)
         if isinstance(self.road, SignalisedRoad):
             self.signals.append(tuple(_SIGNALS[self.road.signal(k)] for k in range(4)))
 
@@ -143,7 +147,7 @@ class Film:
             self.rights[row] = [int(vehicle.approach), bool(vehicle.has_right), bool(vehicle.ran_red_light)]
 
     def _note_route(self, vehicle: Any) -> None:
-        """Lane that a driver heads for, "" = it is steered freely, and the roads of its route: noted when they change."""
+        """Lane that a driver heads for, "" = it is steered freely, and the roads of its route, when they change."""
         row, target = self._row_of(vehicle), getattr(vehicle, "target_lane_index", None)
         announced = target, tuple(step[:2] for step in getattr(vehicle, "route", None) or [])
         if self.announced.get(row) != announced:
@@ -217,7 +221,7 @@ class Film:
             tuple(self.contacts.values()),
             self._meta(info),
         )
-        return trace.replaced(events=_events(trace, self.events))
+        return trace.replaced(events=_events(trace, self.events, self.hit))
 
     def _lights(self) -> tuple[Light, ...]:
         lights = []
@@ -396,7 +400,7 @@ def _areas(scene: Any) -> tuple[np.ndarray, list[int]]:
     return area, users
 
 
-def _events(trace: Trace, noted: list[Event]) -> tuple[Event, ...]:
+def _events(trace: Trace, noted: list[Event], hit: dict[int, int]) -> tuple[Event, ...]:
     """What happened when, in order."""
     events = list(noted)
     for ego in trace.egos:
@@ -413,15 +417,10 @@ def _events(trace: Trace, noted: list[Event]) -> tuple[Event, ...]:
                 if end < len(on):
                     events.append(Event(float(trace.time[end]), f"{name} ends", ego.user, partner))
     users = trace.users
-    for row in range(len(users.ids)):
-        hit = np.flatnonzero(users.crashed[:, row])
-        if len(hit):
-            t = int(hit[0])
-            distance = np.hypot(users.x[t] - users.x[t, row], users.y[t] - users.y[t, row])
-            distance[row] = np.inf
-            distance[~users.crashed[t]] = np.inf
-            nearest = int(np.nanargmin(distance)) if np.isfinite(distance).any() else -1
-            events.append(Event(float(trace.time[t]), "contact", row, nearest))
+    for row, t in hit.items():
+        distance = np.hypot(users.x[t] - users.x[t, row], users.y[t] - users.y[t, row])
+        others = [other for other, at in hit.items() if other != row and at <= t]
+        events.append(Event(float(trace.time[t]), "contact", row, min(others, key=lambda i: distance[i], default=-1)))
     for contact in trace.contacts:
         assert contact.verdict in VERDICTS
         events.append(Event(contact.time, "verdict", contact.user, contact.partner, contact.verdict))

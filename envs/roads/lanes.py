@@ -243,7 +243,9 @@ def heading_of(vehicle: Any) -> Heading:
 
 def heading_anywhere(network: Any, index: LaneIndex, position: Any, width: float) -> Heading:
     """`Heading` of a car on a lane that is steered freely."""
-    return Heading(index, (), tuple(lane for lane in _forks(network, index) if _overlaps(network, lane, position, width)))
+    return Heading(
+        index, (), tuple(lane for lane in _forks(network, index) if _overlaps(network, lane, position, width))
+    )
 
 
 def heading_toward(network: Any, index: LaneIndex, target: LaneIndex, route: list[LaneIndex]) -> Heading:

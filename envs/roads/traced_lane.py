@@ -1,6 +1,7 @@
 """A lane of a trace, as highway-env's road networks have lanes."""
 
 from dataclasses import asdict
+from itertools import pairwise
 
 import numpy as np
 from highway_env.road.lane import AbstractLane
@@ -33,7 +34,7 @@ class TracedLane(AbstractLane):
 
     def pieces(self, shift: float = 0.0) -> list[tuple[float, ...]]:
         """Start x, y, heading, curvature, length of each piece, or of what runs beside it."""
-        moved = []
+        moved: list[tuple[float, ...]] = []
         for x, y, heading, curvature, length in self._pieces:
             scale = max(1.0 - curvature * shift, 1e-3)
             x, y = x - shift * np.sin(heading), y + shift * np.cos(heading)
@@ -77,7 +78,7 @@ class TracedLane(AbstractLane):
 
 def _pieces(centre: np.ndarray) -> list[tuple[float, float, float, float, float]]:
     pieces = []
-    for (x, y, heading), (x_next, y_next, heading_next) in zip(centre[:-1], centre[1:], strict=True):
+    for (x, y, heading), (x_next, y_next, heading_next) in pairwise(centre):
         chord, course = float(np.hypot(x_next - x, y_next - y)), float(np.arctan2(y_next - y, x_next - x))
         turn = float(wrap_angle(heading_next - heading))
         if turn != 0.0 and abs(wrap_angle(course - heading - turn / 2)) < _ARC:

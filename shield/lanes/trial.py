@@ -1,7 +1,7 @@
 """A whole log tried at once: every sample of every pair of one road user, and the verdict of its first contact.
 
-It takes the samples in order through `assess`, `remember`, `judge_motion` and `audit_command`, as a shield does while it
-drives, so that who judges a log afterwards and who judged on the spot say the same.
+It takes the samples in order through `assess`, `remember`, `judge_motion` and `audit_command`, as a shield does while
+it drives, so that who judges a log afterwards and who judged on the spot say the same.
 """
 
 import numpy as np

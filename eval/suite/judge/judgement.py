@@ -37,7 +37,9 @@ class Blame(NamedTuple):
     time: float  # [s]
     users: tuple[int, int]
     at_fault: tuple[int, ...]  # users who broke a duty; empty = see `verdict`
-    verdict: str  # "first", "second", "both", "inherited", "other" (who broke none was hit by who can't be judged), "none"
+    verdict: (
+        str  # "first", "second", "both", "inherited", "other" (who broke none was hit by who can't be judged), "none"
+    )
     views: dict[int, dict[str, Any]]  # by user: what its own view says, as a shield's `blame_evidence`
     is_sure: bool
 
@@ -110,7 +112,9 @@ def _dangers(trace: Trace, table: Table, i: int, seen: Seen, noise: Noise) -> li
             duty = int(part["ego_broke"][broken[0]]) if len(broken) else KEPT
             excess = float(part["ego_excess"][part["ego_broke"] == duty].max()) if len(broken) else 0.0
             brakes, stops = part["owes_braking"].any(), part["owes_stop"].any()
-            first = trace.time[start] - trace.dt * (part["since"][0] - 1)  # danger there from the start counts from then
+            first = trace.time[start] - trace.dt * (
+                part["since"][0] - 1
+            )  # danger there from the start counts from then
             found.append(
                 Danger(
                     i,

@@ -13,13 +13,13 @@ from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Obstacle
 
-from rss_shield.eval.suite.judge.contacts import near_pairs, touches
-from rss_shield.eval.suite.judge.lanes import Table
-from rss_shield.eval.suite.judge.world import World
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.step import attach
 from rss_shield.envs.options import PLANS, WAITING, Settings
 from rss_shield.envs.worlds.signalised import SignalisedRoad, compile_signal
+from rss_shield.eval.suite.judge.contacts import near_pairs, touches
+from rss_shield.eval.suite.judge.lanes import Table
+from rss_shield.eval.suite.judge.world import World
 from rss_shield.shield.junctions.controller import ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED
 from rss_shield.shield.junctions.plans import INTENTS

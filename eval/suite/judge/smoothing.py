@@ -29,7 +29,7 @@ class Noise(NamedTuple):
 
 def window_of(dt: float, samples: int) -> int:
     """Samples of a fit: odd, more than the order, and no more than there are."""
-    wanted = max(int(round(WINDOW / dt)) | 1, ORDER + 2 | 1)
+    wanted = max(round(WINDOW / dt) | 1, ORDER + 2 | 1)
     return min(wanted, samples if samples % 2 else samples - 1)
 
 
@@ -80,4 +80,3 @@ def stretches(present: np.ndarray) -> list[tuple[int, int]]:
     """[start, end) of each stretch of a series `[T]` of bool that is True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-

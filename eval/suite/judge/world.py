@@ -235,4 +235,4 @@ def _lane_along(trace: Trace) -> Lane:
         (s * np.cos(heading) - middle * np.sin(heading), s * np.sin(heading) + middle * np.cos(heading))
         for s in (along.min() - _OPEN, along.max() + _OPEN)
     ]
-    return straight_lane("road", *ends, width=float(np.ptp(across)) + 4.0)
+    return straight_lane("road", ends[0], ends[1], width=float(np.ptp(across)) + 4.0)
