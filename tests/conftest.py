@@ -37,6 +37,7 @@ SLOW = frozenset(
         "envs/test_taken_back",
         "envs/test_wrapper",
         "eval/test_learning_curve",
+        "eval/test_offline_judge",
         "eval/test_replay",
         "eval/test_rollout",
         "fast/test_adapter",

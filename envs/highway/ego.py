@@ -20,7 +20,7 @@ from rss_shield.shield.lanes.controller import (
     respond,
 )
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
-from rss_shield.shield.lanes.judge import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
+from rss_shield.shield.lanes.judge import DUTIES, VERDICTS, WEIGHT, Log, Verdict, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
@@ -471,8 +471,7 @@ class ShieldedEgo:
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
         verdicts = self._verdicts(touching)
         # several at once: the one that weighs most against the ego counts
-        weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
-        i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: weight[VERDICTS[pair[1].verdict]])
+        i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: WEIGHT[VERDICTS[pair[1].verdict]])
         return {
             "verdict": VERDICTS[verdict.verdict],
             "partner": self._index_on_road(i),

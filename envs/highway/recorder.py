@@ -106,7 +106,7 @@ class Film:
         env: Any = self.env.unwrapped
         for vehicle in env.controlled_vehicles:
             self._film_of(vehicle).look(self)
-        self.look_for_contacts()
+        self._note_contacts(len(self.samples) - 1)
         type(self.road).step(self.road, dt)
         self.commands.append(
             {
@@ -163,7 +163,9 @@ class Film:
 
         To be called after each decision: a shield judges a contact at the end of it at the latest.
         """
-        now = max(len(self.samples) - 1, 0) * self.dt
+        self._note_contacts(len(self.samples))
+
+    def _note_contacts(self, sample: int) -> None:
         road = [*self.road.vehicles, *self.road.objects]
         for row, film in self.egos.items():
             shield = shield_on(film.vehicle)
@@ -172,7 +174,7 @@ class Film:
             found = dict(shield.judge.contact)
             k = found.pop("partner")
             partner = self._row_of(road[k]) if 0 <= k < len(road) else -1
-            self.contacts[row] = Contact(now, row, partner, found.pop("verdict"), found)
+            self.contacts[row] = Contact(sample * self.dt, row, partner, found.pop("verdict"), found)
 
     # -- afterwards
 
@@ -245,6 +247,7 @@ class Film:
             "routes": self.routes,
             "shielded": [row for row, user in enumerate(self.users) if "act" in vars(user)],
             "mode": "off",
+            "integration": "euler",
         }
         if isinstance(self.road, SignalisedRoad):
             meta |= {"clock": self.clock, "rights": self.rights}

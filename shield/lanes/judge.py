@@ -60,8 +60,9 @@ DUTIES = (
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")
 AT_FAULT = ("ego", "both")  # verdicts that charge the ego
+WEIGHT = {"inherited": 0, "other": 1, "both": 2, "ego": 3, "none": 4}  # of several at once the heaviest counts
 
-NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
+NOW, NEXT_FRAME = np.int64(0), np.int64(1)
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
 
 
@@ -86,6 +87,12 @@ def _blame_other(memory, duty, excess):
 
 @compiled
 def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
+    """`judge_motion_in` of cars that a simulator moves by explicit Euler, frame by frame."""
+    judge_motion_in(memory, ego, user, ego_params, other_params, ahead, slack, dt, dt)
+
+
+@compiled
+def judge_motion_in(memory, ego, user, ego_params, other_params, ahead, slack, dt, step):
     """Hold what each has used of the distance at the threshold against its share, on a dangerous sample.
 
     Args:
@@ -96,11 +103,12 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
       slack: how far the ego's heading may overshoot its share in that extrapolation [m]; it lags
         behind the lateral speed, and `overlap_margin` is there for it.
       dt: length of a frame [s].
+      step: of explicit Euler [s]; 0 where cars move as cars do, and frames are only when somebody looked.
     """
-    step = ahead * dt
+    later = ahead * dt
     if owes(memory, LON):
-        travel_ego = memory.travel_ego + ego.speed * ego.cos * step
-        travel_other = memory.travel_other + user.speed * user.cos * step
+        travel_ego = memory.travel_ego + ego.speed * ego.cos * later
+        travel_other = memory.travel_other + user.speed * user.cos * later
         longer_ego = ego.half_length - memory.half_length_ego
         longer_other = user.half_length - memory.half_length_other
         # danger from the start is counted from its first sample, any other from the safe one before
@@ -108,18 +116,18 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
         if not is_following(memory.v_ego, memory.v_other, memory.opposite):
             sign = 1.0 if memory.ego_is_rear else -1.0
             b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, ego_params, other_params)
-            share = _share_toward(sign * memory.v_ego, ego_params, b_ego, dt)
+            share = _share_toward(sign * memory.v_ego, ego_params, b_ego, step)
             blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
-            share = _share_toward(-sign * memory.v_other, other_params, b_other, dt)
+            share = _share_toward(-sign * memory.v_other, other_params, b_other, step)
             _blame_other(memory, TOO_FAR, -sign * travel_other + longer_other - share)
         elif memory.ego_is_rear:
-            blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, ego_params, dt))
-            share = _share_front(tau, memory.v_other, other_params, dt)
+            blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, ego_params, step))
+            share = _share_front(tau, memory.v_other, other_params, step)
             _blame_other(memory, TOO_SHORT, share - travel_other + longer_other)
         else:
-            share = _share_front(tau, memory.v_ego, ego_params, dt) - memory.way_back
+            share = _share_front(tau, memory.v_ego, ego_params, step) - memory.way_back
             blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
-            share = _share_rear(tau, memory.v_other, other_params, dt)
+            share = _share_rear(tau, memory.v_other, other_params, step)
             _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
         if ahead == 0 and memory.age > 1 and not user.wreck:
             duty, excess = _audit_acceleration(
@@ -132,13 +140,13 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
             )
             _blame_other(memory, duty, excess)
     if owes(memory, LAT):
-        used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * step
-        share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
+        used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * later
+        share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, step)
         blame_ego(memory, TOO_CLOSE, used - share - slack)
-        used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * step
+        used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * later
         # a driver may already use the first frame's growth on it; mu has room for that
-        first_frame = other_params.a_lat_max_accel * dt**2
-        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt) - first_frame)
+        first_frame = other_params.a_lat_max_accel * step**2
+        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, step) - first_frame)
 
 
 @inner
@@ -277,7 +285,13 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
     if memory.since > 0:
         judge_motion(memory, ego, user, ego_params, other_params, NOW, 0.0, dt)
         # the simulator predicts contacts one frame ahead
-        judge_motion(memory, ego, user, ego_params, other_params, _NEXT_FRAME, rules.overlap_margin, dt)
+        judge_motion(memory, ego, user, ego_params, other_params, NEXT_FRAME, rules.overlap_margin, dt)
+    return sum_up(memory)
+
+
+@compiled
+def sum_up(memory):
+    """`Verdict` of a contact by what is remembered of the pair."""
     ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
     if memory.since == 0:
         verdict = NOBODY

@@ -1,14 +1,14 @@
 """A whole log tried at once: every sample of every pair of one road user, and the verdict of its first contact.
 
-It takes the samples in order through `assess`, `remember`, `judge_motion` and `audit_command`, as a shield does while
-it drives, so that who judges a log afterwards and who judged on the spot say the same.
+The samples go in order through `assess`, `remember`, `judge_motion_in` and `audit_command`, as while a shield drives,
+so that who judges a log afterwards and who judged on the spot say the same.
 """
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled_for_arrays
+from rss_shield.shield._numba.compiled import compiled_for_arrays, inner
 from rss_shield.shield.command import Command
-from rss_shield.shield.lanes.judge import KEPT, NOW, audit_command, blame_ego, judge_contact, judge_motion
+from rss_shield.shield.lanes.judge import KEPT, NEXT_FRAME, NOW, audit_command, blame_ego, judge_motion_in, sum_up
 from rss_shield.shield.lanes.memory import (
     MEMORY,
     catch_up,
@@ -64,7 +64,7 @@ VERDICT = np.dtype(
 
 
 @compiled_for_arrays
-def try_pairs(log, touches, who, ego_params, other_params, rules, dt, found, verdicts):
+def try_pairs(log, touches, who, ego_params, other_params, rules, dt, step, tolerances, found, verdicts):
     """Judge one road user against some others, sample by sample, up to its first contact.
 
     Args:
@@ -74,13 +74,14 @@ def try_pairs(log, touches, who, ego_params, other_params, rules, dt, found, ver
       ego_params, other_params: `RSSParams`, response times in whole frames.
       rules: `Rules` in force.
       dt: length of a frame [s].
+      step: of explicit Euler, 0 where cars move as cars do, see `judge_motion_in` [s].
+      tolerances: `[D]` by how much each of DUTIES may be broken before it counts, in its unit.
       found: `[T, N]` PAIR_FRAME, filled in for those.
       verdicts: `[N]` VERDICT, likewise.
     """
-    frames = len(log.ego)
     memory = np.zeros(len(who), MEMORY)
     unknown = np.zeros(1, MEMORY)
-    for t in range(frames):
+    for t in range(len(log.ego)):
         ego = log.ego[t]
         command = Command(log.acceleration[t], log.slip[t])
         drift = 0.5 * log.curvature[t] * ego.speed**2 * dt
@@ -94,21 +95,25 @@ def try_pairs(log, touches, who, ego_params, other_params, rules, dt, found, ver
             if log.jumped[t, i]:
                 forget_safe(known)
             catch_up(known, log.ego_before[t], log.users_before[t, i], ego_params, other_params, rules, dt)
-            if ends:
-                if touches[t, i]:
-                    verdict = judge_contact(ego, user, known, ego_params, other_params, rules, dt)
-                    out = verdicts[i]
-                    out.frame, out.verdict, out.axes, out.frames = t, verdict.verdict, verdict.axes, verdict.frames
-                    out.ego_duty, out.ego_excess = verdict.ego_duty, verdict.ego_excess
-                    out.other_duty, out.other_excess = verdict.other_duty, verdict.other_excess
+            if ends and not touches[t, i]:
                 continue
             pair = assess(ego, user, ego_params, other_params, rules, dt)
             remember(known, pair, ego, user, dt)
-            cell.duty, cell.excess = KEPT, 0.0
+            ego_broke, other_broke = known.ego_broke, known.other_broke
             if known.since > 0:
-                judge_motion(known, ego, user, ego_params, other_params, NOW, 0.0, dt)
-                if not np.isnan(log.acceleration[t]):
-                    duty, excess = audit_command(known, ego, command, drift, ego_params, dt)
+                judge_motion_in(known, ego, user, ego_params, other_params, NOW, 0.0, dt, step)
+            if ends:
+                if known.since > 0:
+                    slack = rules.overlap_margin
+                    judge_motion_in(known, ego, user, ego_params, other_params, NEXT_FRAME, slack, dt, step)
+                _excuse(known, ego_broke, other_broke, tolerances)
+                _write(sum_up(known), t, verdicts[i])
+                continue
+            _excuse(known, ego_broke, other_broke, tolerances)
+            cell.duty, cell.excess = KEPT, 0.0
+            if known.since > 0 and not np.isnan(log.acceleration[t]):
+                duty, excess = audit_command(known, ego, command, drift, ego_params, dt)
+                if excess > tolerances[duty]:
                     cell.duty, cell.excess = duty, excess
                     blame_ego(known, duty, excess)
             cell.present, cell.dangerous = True, known.since > 0
@@ -123,3 +128,19 @@ def try_pairs(log, touches, who, ego_params, other_params, rules, dt, found, ver
             cell.other_broke, cell.other_excess = known.other_broke, known.other_excess
         if ends:
             break
+
+
+@inner
+def _excuse(memory, ego_broke, other_broke, tolerances):
+    """Take back what one of the two has broken on this sample by no more than is tolerated."""
+    if ego_broke == KEPT and memory.ego_excess <= tolerances[memory.ego_broke]:
+        memory.ego_broke, memory.ego_excess = KEPT, 0.0
+    if other_broke == KEPT and memory.other_excess <= tolerances[memory.other_broke]:
+        memory.other_broke, memory.other_excess = KEPT, 0.0
+
+
+@inner
+def _write(verdict, t, out):
+    out.frame, out.verdict, out.axes, out.frames = t, verdict.verdict, verdict.axes, verdict.frames
+    out.ego_duty, out.ego_excess = verdict.ego_duty, verdict.ego_excess
+    out.other_duty, out.other_excess = verdict.other_duty, verdict.other_excess

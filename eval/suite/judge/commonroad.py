@@ -45,10 +45,10 @@ def read_commonroad(path: str | Path) -> Trace:
     count = 1 + max(step for one in states.values() for step in one)
     still = list(scenario.static_obstacles)
     shape = (count, len(moving) + len(still))
-    x, y, heading, speed, acceleration = (np.full(shape, np.nan) for _ in range(5))
+    x, y, heading, speed = (np.full(shape, np.nan) for _ in range(4))
     for i, obstacle in enumerate(moving):
-        for step, (px, py, angle, v, a) in states[obstacle.obstacle_id].items():
-            x[step, i], y[step, i], heading[step, i], speed[step, i], acceleration[step, i] = px, -py, -angle, v, a
+        for step, (px, py, angle, v) in states[obstacle.obstacle_id].items():
+            x[step, i], y[step, i], heading[step, i], speed[step, i] = px, -py, -angle, v
     for i, obstacle in enumerate(still, len(moving)):
         (px, py), angle = obstacle.initial_state.position, float(obstacle.initial_state.orientation)
         x[:, i], y[:, i], heading[:, i], speed[:, i] = px, -py, -angle, 0.0
@@ -66,8 +66,8 @@ def read_commonroad(path: str | Path) -> Trace:
     return Trace(float(scenario.dt), time, users, lanes, meta={"source": Path(path).name})
 
 
-def _states(obstacle: Any) -> dict[int, tuple[float, float, float, float, float]]:
-    """By time step: x, y, orientation, speed, acceleration; NaN where the file does not say."""
+def _states(obstacle: Any) -> dict[int, tuple[float, float, float, float]]:
+    """By time step: x, y, orientation, speed. Accelerations, where a file has them, are noisier than estimates."""
     found = {}
     path = obstacle.prediction.trajectory.state_list if obstacle.prediction is not None else []
     for state in [obstacle.initial_state, *path]:
@@ -75,9 +75,7 @@ def _states(obstacle: Any) -> dict[int, tuple[float, float, float, float, float]
         v = float(state.velocity)
         if getattr(state, "velocity_y", None) is not None:  # a point mass
             v = float(np.hypot(state.velocity, state.velocity_y))
-        a = getattr(state, "acceleration", None)
-        place = float(position[0]), float(position[1]), float(state.orientation), v
-        found[int(state.time_step)] = (*place, np.nan if a is None else float(a))
+        found[int(state.time_step)] = float(position[0]), float(position[1]), float(state.orientation), v
     return found
 
 

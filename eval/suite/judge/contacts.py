@@ -44,9 +44,10 @@ def touches(trace: Trace, i: int, j: int) -> np.ndarray:
     crashed = trace.users.crashed[:, i] & trace.users.crashed[:, j]
     happens = now | crashed
     happens[:-1] |= now[1:] | crashed[1:]
-    touching = now | (soon & happens)
     noted = [_first_contact(trace, one) for one in (i, j)]
-    return touching & (trace.time > max(noted) - 0.5 * trace.dt) if np.isfinite(noted).all() else touching
+    if np.isfinite(noted).all():
+        return (now | soon) & (trace.time > max(noted) - 0.5 * trace.dt)
+    return now | (soon & happens)
 
 
 def _first_contact(trace: Trace, i: int) -> float:

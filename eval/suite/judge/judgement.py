@@ -7,9 +7,9 @@ import numpy as np
 
 from rss_shield.eval.suite.judge.lanes import Seen, Table, see_all, table_of
 from rss_shield.eval.suite.judge.plans import see_junction
-from rss_shield.eval.suite.judge.smoothing import SURE, Noise, filled_in, stretches
+from rss_shield.eval.suite.judge.smoothing import EXACT, SURE, Noise, filled_in, stretches
 from rss_shield.shield.definitions.response import AXES, LAT, LON
-from rss_shield.shield.lanes.judge import AT_FAULT, DUTIES, KEPT, VERDICTS
+from rss_shield.shield.lanes.judge import DUTIES, KEPT, VERDICTS, WEIGHT
 from rss_shield.shield.params import Preset, Rules
 from rss_shield.shield.trace import Trace
 
@@ -58,10 +58,8 @@ class Judgement:
 
     def verdict_of(self, user: int) -> str:
         """What a shield on this user would say of its first contact; "" = it had none."""
-        for blame in self.blames:
-            if user in blame.views:
-                return str(blame.views[user]["verdict"])
-        return ""
+        said = [str(blame.views[user]["verdict"]) for blame in self.blames if user in blame.views]
+        return max(said, key=lambda verdict: WEIGHT[verdict], default="")
 
 
 def judge_trace(
@@ -86,35 +84,37 @@ def judge_trace(
     chosen = list(range(len(trace.users.ids))) if users is None else users
     if trace.meta.get("scheme") == "plans":
         blames, notes = see_junction(trace, table, users)
-        return Judgement(trace, table, {}, (), _joined(trace, blames, noise), noise, notes)
+        return Judgement(trace, table, {}, (), _joined(trace, blames, blames), noise, notes)
     seen = see_all(trace, table, chosen)
-    dangers = [one for i in chosen for one in _dangers(trace, table, i, seen[i], noise)]
-    views = {(i, int(j)): view for i in chosen for j, view in _views(trace, seen[i]).items()}
+    sure = seen if noise == EXACT else see_all(trace, table, chosen, noise)
+    dangers = [one for i in chosen for one in _dangers(trace, table, i, seen[i], sure[i])]
+    views = [{(i, j): view for i in chosen for j, view in _views(trace, one[i]).items()} for one in (seen, sure)]
     return Judgement(
         trace,
         table,
         seen,
         tuple(sorted(dangers, key=lambda one: (one.start, one.user, one.partner))),
-        _joined(trace, views, noise),
+        _joined(trace, *views),
         noise,
         _notes(trace, noise),
     )
 
 
-def _dangers(trace: Trace, table: Table, i: int, seen: Seen, noise: Noise) -> list[Danger]:
+def _dangers(trace: Trace, table: Table, i: int, seen: Seen, sure: Seen) -> list[Danger]:
+    """Stretches of danger of one user. Of duties those count that were surely broken, or else those that seem to be."""
     own = table.ego if i in trace.ego_users else table.other
     found = []
     for j in np.flatnonzero(seen.frames["dangerous"].any(axis=0)):
         frames = seen.frames[:, j]
         for start, end in stretches(frames["dangerous"]):
-            part = frames[start:end]
-            broken = np.flatnonzero(part["ego_broke"] != KEPT)
-            duty = int(part["ego_broke"][broken[0]]) if len(broken) else KEPT
-            excess = float(part["ego_excess"][part["ego_broke"] == duty].max()) if len(broken) else 0.0
+            part, surely = frames[start:end], sure.frames[start:end, j]
+            is_sure = bool((surely["ego_broke"] != KEPT).any())
+            judged = surely if is_sure else part
+            broken = np.flatnonzero(judged["ego_broke"] != KEPT)
+            duty = int(judged["ego_broke"][broken[0]]) if len(broken) else KEPT
+            excess = float(judged["ego_excess"][judged["ego_broke"] == duty].max()) if len(broken) else 0.0
             brakes, stops = part["owes_braking"].any(), part["owes_stop"].any()
-            first = trace.time[start] - trace.dt * (
-                part["since"][0] - 1
-            )  # danger there from the start counts from then
+            first = trace.time[start] - trace.dt * part["since"][0]  # the threshold
             found.append(
                 Danger(
                     i,
@@ -128,7 +128,7 @@ def _dangers(trace: Trace, table: Table, i: int, seen: Seen, noise: Noise) -> li
                     DUTIES[duty],
                     excess,
                     float(trace.time[start + broken[0]]) if len(broken) else np.nan,
-                    duty == KEPT or excess > SURE * sigma_of(duty, noise),
+                    duty == KEPT or is_sure,
                 )
             )
     return found
@@ -136,14 +136,6 @@ def _dangers(trace: Trace, table: Table, i: int, seen: Seen, noise: Noise) -> li
 
 def _axis(axes: int) -> str:
     return AXES[axes & (LON | LAT)]
-
-
-def sigma_of(duty: int, noise: Noise) -> float:
-    """Standard deviation of what a duty is measured in."""
-    text = DUTIES[duty]
-    if text.endswith("[m/s^2]"):
-        return noise.acceleration
-    return noise.speed if text.endswith("[m/s]") else noise.position if text.endswith("[m]") else 0.0
 
 
 def _views(trace: Trace, seen: Seen) -> dict[int, dict[str, Any]]:
@@ -164,33 +156,35 @@ def _views(trace: Trace, seen: Seen) -> dict[int, dict[str, Any]]:
     return found
 
 
-def _joined(trace: Trace, views: dict[tuple[int, int], dict[str, Any]], noise: Noise) -> tuple[Blame, ...]:
-    """The two views of every contact as one. Who broke a duty is known best from the own view, commands included."""
+Views = dict[tuple[int, int], dict[str, Any]]  # contacts by (user, partner), from the view of the user
+
+
+def _joined(trace: Trace, seen: Views, sure: Views) -> tuple[Blame, ...]:
+    """The two views of every contact as one; what is surely broken counts, or else what seems to be."""
     blames = []
-    for i, j in sorted({(min(pair), max(pair)) for pair in views}):
+    for i, j in sorted({(min(pair), max(pair)) for pair in seen}):
+        is_sure = seen == sure or bool(_at_fault(sure, i, j))
+        views = sure if is_sure else seen
+        at_fault = _at_fault(views, i, j)
         sides = {a: views[a, b] for a, b in ((i, j), (j, i)) if (a, b) in views}
-        at_fault = set()
-        for a, b in ((i, j), (j, i)):
-            if a in sides and sides[a]["ego_duty"]:
-                at_fault.add(a)
-            if b not in sides and sides[a]["other_duty"]:
-                at_fault.add(b)
-        said = {side["verdict"] for side in sides.values()}
-        if not at_fault:  # neither by its own view
-            at_fault = {b for a, b in ((i, j), (j, i)) if a in sides and sides[a]["verdict"] == "other"}
         if len(at_fault) == 2:
             verdict = "both"
         elif at_fault:
             verdict = "first" if i in at_fault else "second"
         else:
-            verdict = "inherited" if "inherited" in said else "none"
+            verdict = "inherited" if "inherited" in {side["verdict"] for side in sides.values()} else "none"
         frame = min(side["frame"] for side in sides.values())
-        sure = all(
-            not side["ego_duty"] or side["ego_excess"] > SURE * sigma_of(DUTIES.index(side["ego_duty"]), noise)
-            for side in sides.values()
-        )
-        blames.append(Blame(float(trace.time[frame]), (i, j), tuple(sorted(at_fault)), verdict, sides, sure))
+        blames.append(Blame(float(trace.time[frame]), (i, j), tuple(sorted(at_fault)), verdict, sides, is_sure))
     return tuple(sorted(blames, key=lambda blame: blame.time))
+
+
+def _at_fault(views: Views, i: int, j: int) -> set[int]:
+    """Who broke a duty is known best from the own view, commands included; else by the view of the other."""
+    found = {a for a, b in ((i, j), (j, i)) if (a, b) in views and views[a, b]["ego_duty"]}
+    found |= {b for a, b in ((i, j), (j, i)) if (b, a) not in views and (a, b) in views and views[a, b]["other_duty"]}
+    if not found:
+        found = {b for a, b in ((i, j), (j, i)) if (a, b) in views and views[a, b]["verdict"] == "other"}
+    return found
 
 
 def _notes(trace: Trace, noise: Noise) -> tuple[str, ...]:
@@ -200,11 +194,9 @@ def _notes(trace: Trace, noise: Noise) -> tuple[str, ...]:
             f"accelerations are estimated, within {noise.acceleration:.2f} m/s^2 (one standard deviation): a duty that "
             f"was broken by less than {SURE:g} of these is marked as not sure"
         )
+    unlike = sorted(set(trace.users.kinds) & {"pedestrian", "bicycle"})
+    if unlike:
+        notes.append(f"there is a {' and a '.join(unlike)}: judged by the rules for cars, of which not all fit")
     if not trace.lanes:
         notes.append("the log has no lanes: everybody is taken to drive along one straight road")
     return tuple(notes)
-
-
-def is_at_fault(view: dict[str, Any]) -> bool:
-    """Does one view charge who has it?"""
-    return view["verdict"] in AT_FAULT

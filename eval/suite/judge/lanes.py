@@ -5,11 +5,16 @@ from typing import NamedTuple
 import numpy as np
 
 from rss_shield.eval.suite.judge.contacts import near_pairs, touches
+from rss_shield.eval.suite.judge.smoothing import EXACT, SURE, Noise, sigma_of
 from rss_shield.eval.suite.judge.world import World, views
 from rss_shield.shield.definitions.kinematics import frames_for
+from rss_shield.shield.lanes.judge import DUTIES
 from rss_shield.shield.lanes.trial import PAIR_FRAME, VERDICT, try_pairs
 from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
 from rss_shield.shield.trace import Trace
+
+RULES = Rules()
+REAL_RULES = Rules(discretisation_margin=False, overlap_margin=0.0)  # cars that move as cars do need no such margins
 
 
 class Table(NamedTuple):
@@ -47,8 +52,13 @@ def table_of(trace: Trace, params: str | Preset | None = None, rules: Rules | No
         preset = PRESETS[params or "slides"] if not isinstance(params, Preset) else params
         ego, other = preset.ego, preset.other
     if rules is None:
-        rules = Rules(**trace.meta["judge_rules"]) if own is not None else Rules()
+        rules = Rules(**trace.meta["judge_rules"]) if own is not None else RULES if is_simulated(trace) else REAL_RULES
     return Table(whole_frames(ego, trace.dt), whole_frames(other, trace.dt), rules)
+
+
+def is_simulated(trace: Trace) -> bool:
+    """Did a simulator move everybody by explicit Euler, from one sample to the next?"""
+    return trace.meta.get("integration") == "euler"
 
 
 def whole_frames(params: RSSParams, dt: float) -> RSSParams:
@@ -72,15 +82,23 @@ def slips(trace: Trace) -> np.ndarray:
     return slip
 
 
-def see_all(trace: Trace, table: Table, users: list[int] | None = None) -> dict[int, Seen]:
+def tolerances_of(noise: Noise) -> np.ndarray:
+    """By how much each of DUTIES may seem to be broken because of noise, in its unit."""
+    return np.array([SURE * sigma_of(duty, noise) for duty in range(len(DUTIES))])
+
+
+def see_all(trace: Trace, table: Table, users: list[int] | None = None, noise: Noise = EXACT) -> dict[int, Seen]:
     """What each user sees of all others, judged.
 
     Args:
       trace: `Trace` with accelerations.
       table: `Table`.
       users: whose views; None = everybody's.
+      noise: of the log: what it explains counts as kept.
     """
+    tolerances = tolerances_of(noise)
     world, slip = World(trace), slips(trace)
+    step = trace.dt if is_simulated(trace) else 0.0
     count, egos = len(trace.users.ids), set(trace.ego_users)
     touching: dict[tuple[int, int], np.ndarray] = {}
     for i, j in near_pairs(trace):
@@ -110,7 +128,7 @@ def see_all(trace: Trace, table: Table, users: list[int] | None = None) -> dict[
                 (table.other, [k for k, j in enumerate(others) if j not in egos]),
             ):
                 if who:
-                    args = log, hit, np.array(who), own, params, table.rules, trace.dt
+                    args = log, hit, np.array(who), own, params, table.rules, trace.dt, step, tolerances
                     try_pairs(*args, found, said)
             frames[window][:, others] = found
             said["frame"][said["frame"] >= 0] += start

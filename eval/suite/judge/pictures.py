@@ -1,6 +1,7 @@
 """A judgement as a picture: along the road over time, gap and required gap, duties, and the road from above."""
 
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import matplotlib
@@ -16,6 +17,7 @@ from rss_shield.eval.suite.judge.smoothing import stretches
 
 USER, PARTNER, OTHERS, DANGER, BROKEN = "#0072b2", "#e69f00", "#999999", "#f6d5c5", "#c0392b"
 _KEY_FRAMES = 5
+_LONGEST_LINE = 150  # of a title
 _AROUND = 45.0  # of the pair, on the road from above [m]
 
 
@@ -59,7 +61,8 @@ def draw(judgement: Judgement, path: Path, pair: tuple[int, int] | None = None) 
             _duties(figure.add_subplot(grid[2, :], sharex=upper), judgement, i, j)
         for k, t in enumerate(key_frames(judgement, i, j)):
             _from_above(figure.add_subplot(grid[3, k]), judgement, i, j, t)
-        figure.suptitle("\n".join(_title(judgement, i, j)), fontsize=9, ha="center")
+        title = [part for line in _title(judgement, i, j) for part in wrap(line, _LONGEST_LINE)]
+        figure.suptitle("\n".join(title), fontsize=9)
         with atomic(path) as temporary:
             figure.savefig(temporary, format=path.suffix[1:], dpi=110, metadata=_undated(path.suffix))
 
@@ -77,9 +80,8 @@ def key_frames(judgement: Judgement, i: int, j: int) -> list[int]:
     moments = [blame.time for blame in judgement.blames if set(blame.users) == {i, j}] + moments
     wanted = [int(np.argmin(np.abs(trace.time - m))) for m in moments if not np.isnan(m)]
     chosen = list(dict.fromkeys(t for t in wanted if t in there))[:_KEY_FRAMES]
-    for t in np.linspace(there[0], there[-1], 3 * _KEY_FRAMES).astype(int):
-        if len(chosen) < _KEY_FRAMES and t not in chosen:
-            chosen.append(int(t))
+    while len(chosen) < min(_KEY_FRAMES, len(there)):  # the sample that is farthest from all chosen ones
+        chosen.append(int(there[np.abs(there[:, None] - chosen).min(axis=1).argmax()]))
     return sorted(chosen)
 
 
@@ -120,7 +122,7 @@ def _gaps(axes: Any, judgement: Judgement, i: int, j: int) -> None:
         axes.plot(time, gap, color=colour, lw=1.2, label=f"gap {label}")
         axes.plot(time, required, color=colour, lw=1.0, ls="--", label=f"required {label}")
     axes.axhline(0.0, color="black", lw=0.5)
-    finite = np.concatenate([frames[name][there] for name in ("gap_lon", "required_lon")])
+    finite = np.concatenate([frames[name][there] for name in ("gap_lon", "required_lon", "gap_lat")])
     if len(finite):
         axes.set_ylim(min(float(finite.min()), -1.0) - 1.0, min(float(finite.max()), 120.0) + 2.0)
     _shade(axes, judgement, i, j)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
+from rss_shield.shield.lanes.judge import DUTIES
 from rss_shield.shield.trace import Trace
 
 WINDOW = 1.1  # length of the fit: long enough for NGSIM's noise, short enough to see a braking begin [s]
@@ -25,6 +26,17 @@ class Noise(NamedTuple):
     position: float = 0.0  # [m]
     speed: float = 0.0  # [m/s]
     acceleration: float = 0.0  # [m/s^2]
+
+
+EXACT = Noise()
+
+
+def sigma_of(duty: int, noise: Noise) -> float:
+    """Standard deviation of what a duty is measured in."""
+    text = DUTIES[duty]
+    if text.endswith("[m/s^2]"):
+        return noise.acceleration
+    return noise.speed if text.endswith("[m/s]") else noise.position if text.endswith("[m]") else 0.0
 
 
 def window_of(dt: float, samples: int) -> int:
@@ -49,24 +61,32 @@ def filled_in(trace: Trace) -> tuple[Trace, Noise]:
     unknown = np.isnan(u.acceleration) & u.present
     unknown[-1] = False  # nobody knows what follows
     if not unknown.any():
-        return trace, Noise()
-    acceleration, left = u.acceleration.copy(), []
+        return trace, EXACT
+    acceleration = u.acceleration.copy()
+    along: list[np.ndarray] = []
+    across: list[np.ndarray] = []
     for i in np.flatnonzero(unknown.any(axis=0)):
         for start, end in stretches(u.present[:, i]):
             x, y = u.x[start:end, i], u.y[start:end, i]
             cos, sin = np.cos(u.heading[start:end, i]), np.sin(u.heading[start:end, i])
             forward = derivative(x, trace.dt, 2) * cos + derivative(y, trace.dt, 2) * sin
+            v = u.speed[start:end, i]  # the fit goes on braking a little after a car has come to rest
+            forward[:-1] = np.maximum(forward[:-1], (np.minimum(v[1:], 0.0) - v[:-1]) / trace.dt)
             mine = unknown[start:end, i]
             acceleration[start:end, i][mine] = forward[mine]
             if end - start > window_of(trace.dt, end - start) > ORDER:
-                left += [x - derivative(x, trace.dt, 0), y - derivative(y, trace.dt, 0)]
-    return trace.replaced(users=replace(u, acceleration=acceleration)), noise_of(left, trace.dt)
+                dx, dy = x - derivative(x, trace.dt, 0), y - derivative(y, trace.dt, 0)
+                along.append(dx * cos + dy * sin)
+                across.append(dy * cos - dx * sin)
+    return trace.replaced(users=replace(u, acceleration=acceleration)), max(
+        noise_of(along, trace.dt), noise_of(across, trace.dt)
+    )
 
 
 def noise_of(left: list[np.ndarray], dt: float) -> Noise:
     """Standard deviations by what a fit has left over of positions."""
     if not left:
-        return Noise()
+        return EXACT
     window = window_of(dt, 10**6)
     share = 1.0 - savgol_coeffs(window, ORDER)[window // 2]  # of the noise's variance that a fit leaves
     sigma = float(np.sqrt(np.mean(np.concatenate(left) ** 2) / share))
