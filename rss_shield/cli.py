@@ -8,6 +8,8 @@ from rss_shield.eval.interrupt import stop_on_interrupt
 COMMANDS = {
     "train": ("rss_shield.train", "train", "train with and without the shield, test, compare"),
     "test": ("rss_shield.test", "train", "test a model or a policy with the shield and without"),
+    "record": ("rss_shield.eval.suite.record", "train", "play one episode and write down everything"),
+    "judge": ("rss_shield.eval.suite.judge.command", "train", "who was to blame in any log"),
 }
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"
 

@@ -207,7 +207,6 @@ def shield_infos(steps: np.ndarray, dt: float) -> dict[str, Any]:
       Dictionary of arrays `[E]`. `blame_evidence` counts where `blame` is not "".
     """
     frames = np.maximum(steps["frames"], 1)
-    blame = _BLAMES[steps["blame"]]
     return {
         "shield": {
             "intervened": steps["overridden"] > 0,
@@ -228,19 +227,24 @@ def shield_infos(steps: np.ndarray, dt: float) -> dict[str, Any]:
             "response": _RESPONSES[steps["response"]],
         },
         "cost": steps["cost"],
-        "blame": blame,
-        "blame_evidence": {
-            "verdict": blame,
-            "partner": steps["blame_partner"],
-            "danger": KINDS[steps["blame_kind"]],
-            "seconds_since_threshold": steps["blame_frames"] * dt,
-            "ego_duty": _DUTIES[steps["ego_duty"]],
-            "ego_excess": steps["ego_excess"],
-            "other_duty": _DUTIES[steps["other_duty"]],
-            "other_excess": steps["other_excess"],
-        },
+        "blame": _BLAMES[steps["blame"]],
+        "blame_evidence": evidence(steps, dt),
         **{name: steps[name] for name in _SINCE_RESET},
         **{name: steps["comfort"][:, k] for k, name in enumerate(Comfort._fields)},
+    }
+
+
+def evidence(records: np.ndarray, dt: float) -> dict[str, Any]:
+    """What a contact was like: dictionary of arrays `[E]` of records `[E]` with the fields of a contact."""
+    return {
+        "verdict": _BLAMES[records["blame"]],
+        "partner": records["blame_partner"],
+        "danger": KINDS[records["blame_kind"]],
+        "seconds_since_threshold": records["blame_frames"] * dt,
+        "ego_duty": _DUTIES[records["ego_duty"]],
+        "ego_excess": records["ego_excess"],
+        "other_duty": _DUTIES[records["other_duty"]],
+        "other_excess": records["other_excess"],
     }
 
 

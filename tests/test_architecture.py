@@ -14,6 +14,7 @@ LIBRARIES = {
     "agents": {"gymnasium", "sb3_contrib", "stable_baselines3", "torch", "numpy"},
     "eval": {"numpy", "scipy", "pandas", "matplotlib", "rich", "tqdm", "llvmlite", "yaml"},
 }
+SUITE = {"gymnasium", "highway_env", "commonroad"}  # what the suite of evaluations may import, too
 # part -> parts that it may import, itself left out; a part is a folder, or the modules that lie in it directly
 LAWS = {"shield.definitions", "shield.params", "shield._numba"}
 OWES = {
@@ -26,12 +27,13 @@ OWES = {
     "shield.anything",
     "shield.comfort",
 }
-BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions", "shield.filters", "shield.tally"}
+BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions", "shield.filters", "shield.tally", "shield.trace"}
 ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
 ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
 MAY_IMPORT = {
     "shield._numba": set(),
     "shield.params": set(),
+    "shield.trace": set(),
     "shield.definitions": LAWS | {"shield.anything", "shield.geometry"},
     "shield.risk": LAWS | OWES,
     "shield.lanes": LAWS | OWES,
@@ -73,7 +75,9 @@ def own_part(path: Path) -> str:
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_package_imports_its_libraries_and_what_is_below_it(path):
     package = path.relative_to(ROOT).parts[0]
+    in_suite = path.relative_to(ROOT).parts[:2] == ("eval", "suite")
     below = {"rss_shield.shield"} if package == "envs" else set()
+    below |= {"rss_shield.shield", "rss_shield.envs", "rss_shield.agents"} if in_suite else set()
     words = {"rss_shield.shield.verdicts"} if package == "eval" else set()  # what verdicts are called
     for name in names_imported(path):
         top = name.split(".")[0]
@@ -82,7 +86,7 @@ def test_a_package_imports_its_libraries_and_what_is_below_it(path):
         if top == "rss_shield":
             assert ".".join(name.split(".")[:2]) in below | {f"rss_shield.{package}"}
         else:
-            assert top in LIBRARIES[package] | set(sys.stdlib_module_names)
+            assert top in LIBRARIES[package] | (SUITE if in_suite else set()) | set(sys.stdlib_module_names)
 
 
 @pytest.mark.parametrize("path", PARTED, ids=lambda path: str(path.relative_to(ROOT)))
@@ -91,6 +95,12 @@ def test_a_part_imports_what_is_below_it(path):
     imported = {part_of(name.removeprefix("rss_shield.")) for name in names_imported(path) if "rss_shield." in name}
     if part in MAY_IMPORT:
         assert imported - {part, "shield"} <= MAY_IMPORT[part]
+
+
+def test_what_is_evaluated_does_not_import_the_suite():
+    for path in MODULES:
+        if path.relative_to(ROOT).parts[:2] != ("eval", "suite"):
+            assert not any(name.startswith("rss_shield.eval.suite") for name in names_imported(path))
 
 
 def test_the_two_simulators_are_siblings():

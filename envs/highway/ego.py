@@ -32,6 +32,8 @@ from rss_shield.shield.tally import (
     count_change,
     count_frame,
     enter_contact,
+    evidence,
+    info_at,
     note_executed,
     start_decision,
     start_episode,
@@ -52,6 +54,19 @@ class Frame(NamedTuple):
     jumped: tuple[bool, ...] = ()  # `[N]` a user was moved in the lane frame, or with it
     ego_before: np.ndarray | None = None  # `ROAD_USER` on the frame before, in the lane frame of this one
     users_before: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` likewise
+
+
+class Look(NamedTuple):
+    """What a shield made of the last frame, for whoever films the episode."""
+
+    wish: Command  # of the ego's own controller
+    command: Command  # that was executed
+    overridden: bool
+    anticipated: bool
+    limited: bool
+    response: int  # sum of RESPONSE_*
+    partner: int  # index among `ShieldedEgo.others` of who is nearest to danger, or in the way; -1 = nobody
+    dangerous: bool
 
 
 def log_of(frames: list[Frame]) -> Log:
@@ -120,6 +135,7 @@ class ShieldedEgo:
         start_decision(self.tally)
         start_episode(self.since)
         self.record: list[Frame] | None = [] if record else None
+        self.look: Look | None = None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
         self.judge = self  # or another, which watches by a table of its own
         self.answers = False  # does a filter that looks once per decision respond in this one?
@@ -181,6 +197,7 @@ class ShieldedEgo:
             self.tally, self.since, abs(command.acceleration - wish.acceleration), abs(float(steered - steering))
         )
         note_executed(self.tally, command.acceleration, steered)
+        self.look = Look(wish, command, *response[1:], danger.response, danger.partner, pairs > 0)
         self._count(danger, response, pairs, broken)
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.table.dt)
         tally = self.tally
@@ -425,6 +442,11 @@ class ShieldedEgo:
     def blame(self) -> str:
         """The verdict of the ego's contact, "" before one."""
         return VERDICTS[self.since["blame"] - 1] if self.has_contact else ""
+
+    @property
+    def contact(self) -> dict[str, Any] | None:
+        """The contact of the ego: verdict, partner (index on the road), kind of danger, duties broken."""
+        return info_at(evidence(np.array([self.since]), self.settings.table.dt), 0) if self.has_contact else None
 
     def had_contact_before(self) -> None:
         """The vehicle had its contact before there was a shield on it."""

@@ -3,7 +3,7 @@
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
-from rss_shield.envs.highway.ego import Frame, ShieldedEgo
+from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.paths import Size, size_of
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, drift_of, is_outside, junction_of, list_threats, track_of
@@ -24,7 +24,7 @@ from rss_shield.shield.junctions.controller import (
     junction_frame,
 )
 from rss_shield.shield.junctions.held_back import held_by
-from rss_shield.shield.junctions.plans import NEVER, THREAT, Scene
+from rss_shield.shield.junctions.plans import NEVER, THREAT, Scene, Track
 from rss_shield.shield.tally import count_change, note_executed
 from rss_shield.shield.verdicts import Verdict
 
@@ -46,6 +46,8 @@ class JunctionEgo(ShieldedEgo):
         self.size_numbers: list[int] = []  # `[N]` index into the junction's sizes
         self.box = np.zeros(6)
         self.path = -1
+        self.track: Track | None = None  # of the last frame, ...
+        self.ways = 0  # ... and how many of `room` the others might take on it
         self.refused = False  # the lane change of this decision
         self.frames_trapped = 0
         self.pairs_examined = self.pairs_possible = 0  # pair-frames: plans were checked against somebody, could be
@@ -64,6 +66,7 @@ class JunctionEgo(ShieldedEgo):
         scene = self._scene()
         report, steered = self._restrict(scene, acceleration, steering)
         granted = report.acceleration if settings.overrides else acceleration
+        self.track, self.ways = scene.track, len(scene.threats)
         if settings.overrides:
             vehicle.action = {"steering": steered, "acceleration": granted}
         note_executed(self.tally, granted, steered)
@@ -80,8 +83,13 @@ class JunctionEgo(ShieldedEgo):
         count_change(self.tally, self.since, abs(granted - acceleration), abs(float(steered - steering)))
         self._count(report, report, report.pairs, report.broken)
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.table.dt)
+        wish, command = (
+            Command(a, float(np.arctan(0.5 * np.tan(angle))))
+            for a, angle in ((acceleration, steering), (granted, steered))
+        )
+        changed = report.overridden and settings.overrides, report.anticipated, report.limited and settings.overrides
+        self.look = Look(wish, command, *changed, report.response, -1, report.pairs > 0)
         if self.record is not None:
-            command = Command(granted, float(np.arctan(0.5 * np.tan(steered))))
             self.record.append(Frame(tuple(self.keys), self.poses, command))
 
     def _scene(self) -> Scene:

@@ -39,12 +39,13 @@ from rss_shield.shield.verdicts import (
     who_broke,
 )
 
-_NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
+NOW, NEXT_FRAME = np.int64(0), np.int64(1)
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
 
 
 @inner
-def _blame_ego(memory, duty, excess):
+def blame_ego(memory, duty, excess):
+    """Note that the ego broke a duty, if it did; the first one counts, and the most that it was broken by."""
     if excess > _TOLERANCE:
         if memory.ego_broke == KEPT:
             memory.ego_broke = duty
@@ -63,6 +64,12 @@ def _blame_other(memory, duty, excess):
 
 @compiled
 def judge_motion(memory, ego, user, table, ahead, slack):
+    """`judge_motion_in` of cars that a simulator moves by explicit Euler, frame by frame."""
+    judge_motion_in(memory, ego, user, table, ahead, slack, table.dt)
+
+
+@compiled
+def judge_motion_in(memory, ego, user, table, ahead, slack, step):
     """Hold what each has used of the distance at the threshold against its share, on a dangerous sample.
 
     Args:
@@ -72,12 +79,13 @@ def judge_motion(memory, ego, user, table, ahead, slack):
       ahead: frames to extrapolate along the headings: 0, or 1 where contact is predicted.
       slack: how far the ego's heading may overshoot its share in that extrapolation [m]; it lags
         behind the lateral speed, and `overlap_margin` is there for it.
+      step: of explicit Euler [s]; 0 where cars move as cars do, and frames are only when somebody looked.
     """
     dt = table.dt
-    step = ahead * dt
+    later = ahead * dt
     if owes(memory, LON):
-        travel_ego = memory.travel_ego + ego.speed * ego.cos * step
-        travel_other = memory.travel_other + user.speed * user.cos * step
+        travel_ego = memory.travel_ego + ego.speed * ego.cos * later
+        travel_other = memory.travel_other + user.speed * user.cos * later
         longer_ego = ego.half_length - memory.half_length_ego
         longer_other = user.half_length - memory.half_length_other
         # danger from the start is counted from its first sample, any other from the safe one before
@@ -85,18 +93,18 @@ def judge_motion(memory, ego, user, table, ahead, slack):
         if not is_following(memory.v_ego, memory.v_other, memory.opposite):
             sign = 1.0 if memory.ego_is_rear else -1.0
             b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, table.ego, table.other)
-            share = _share_toward(sign * memory.v_ego, table.ego, b_ego, dt)
-            _blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
-            share = _share_toward(-sign * memory.v_other, table.other, b_other, dt)
+            share = _share_toward(sign * memory.v_ego, table.ego, b_ego, step)
+            blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
+            share = _share_toward(-sign * memory.v_other, table.other, b_other, step)
             _blame_other(memory, TOO_FAR, -sign * travel_other + longer_other - share)
         elif memory.ego_is_rear:
-            _blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, table.ego, dt))
-            share = _share_front(tau, memory.v_other, table.other, dt)
+            blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, table.ego, step))
+            share = _share_front(tau, memory.v_other, table.other, step)
             _blame_other(memory, TOO_SHORT, share - travel_other + longer_other)
         else:
-            share = _share_front(tau, memory.v_ego, table.ego, dt) - memory.way_back
-            _blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
-            share = _share_rear(tau, memory.v_other, table.other, dt)
+            share = _share_front(tau, memory.v_ego, table.ego, step) - memory.way_back
+            blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
+            share = _share_rear(tau, memory.v_other, table.other, step)
             _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
         if ahead == 0 and memory.age > 1 and not user.wreck:
             duty, excess = _audit_acceleration(
@@ -109,13 +117,13 @@ def judge_motion(memory, ego, user, table, ahead, slack):
             )
             _blame_other(memory, duty, excess)
     if owes(memory, LAT):
-        used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * step
-        share = approach_no_credit(memory.w_ego, table.ego) + lateral_euler_margin(memory.w_ego, table.ego, dt)
-        _blame_ego(memory, TOO_CLOSE, used - share - slack)
-        used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * step
+        used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * later
+        share = approach_no_credit(memory.w_ego, table.ego) + lateral_euler_margin(memory.w_ego, table.ego, step)
+        blame_ego(memory, TOO_CLOSE, used - share - slack)
+        used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * later
         # a driver may already use the first frame's growth on it; mu has room for that
-        first_frame = table.other.a_lat_max_accel * dt**2
-        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, table.other, dt) - first_frame)
+        first_frame = table.other.a_lat_max_accel * step**2
+        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, table.other, step) - first_frame)
 
 
 @inner
@@ -216,9 +224,9 @@ def judge_frame(ego, users, memory, command, curvature, table, who=None):
     for a in range(how_many(who, users)):
         i = which(who, a)
         if memory[i].since > 0:
-            judge_motion(memory[i], ego, users[i], table, _NOW, 0.0)
+            judge_motion(memory[i], ego, users[i], table, NOW, 0.0)
             duty, excess = audit_command(memory[i], ego, command, drift, table.ego, table.dt)
-            _blame_ego(memory[i], duty, excess)
+            blame_ego(memory[i], duty, excess)
             pairs += 1
             broken += duty != KEPT
     return pairs, broken
@@ -240,9 +248,15 @@ def judge_contact(ego, user, memory, table):
     pair = assess(ego, user, table)
     remember(memory, pair, ego, user, table.dt)
     if memory.since > 0:
-        judge_motion(memory, ego, user, table, _NOW, 0.0)
+        judge_motion(memory, ego, user, table, NOW, 0.0)
         # the simulator predicts contacts one frame ahead
-        judge_motion(memory, ego, user, table, _NEXT_FRAME, table.rules.overlap_margin)
+        judge_motion(memory, ego, user, table, NEXT_FRAME, table.rules.overlap_margin)
+    return sum_up(memory)
+
+
+@compiled
+def sum_up(memory):
+    """`Verdict` of a contact by what is remembered of the pair."""
     never_safe = memory.axes == NEVER
     return judged(NOBODY if memory.since == 0 else who_broke(memory, never_safe), memory.axes, memory)
 
