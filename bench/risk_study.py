@@ -11,6 +11,7 @@ policies, and trained ones, drive with the shield watching and with it acting, a
 import dataclasses
 import sys
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -40,11 +41,12 @@ FIRST_SEED = 900_000
 PAGE, FIGURE, AREA_FIGURE = Path("docs/results/risk.md"), Path("docs/risk.png"), Path("docs/sotif.png")
 HEADER = f"""# Field risk beside RSS
 
-Written by `python bench/risk_study.py --write`. Risk is RDSI of the driving safety field: of each road user around the ego,
-what it adds to the ego's potential energy and how fast that grows, relative to a standard scene (headway 1 s and time to
-collision 4 s at once). Up to RDSI1* driving is *known safe*, up to RDSI2* *unknown*, above *known unsafe*: the areas of SOTIF
-(ISO 21448). Values that the literature has lost are settings (`rss_shield.shield.risk.assumed()` lists them), and what stands
-here is about their defaults: {len(RiskSettings._fields)} settings of `RiskSettings()`, mode "iso" unless it says "radial".
+Written by `python bench/risk_study.py --write`. Risk is RDSI of the driving safety field: of each road user around
+the ego, what it adds to the ego's potential energy and how fast that grows, relative to a standard scene (headway 1 s
+and time to collision 4 s at once). Up to RDSI1* driving is *known safe*, up to RDSI2* *unknown*, above
+*known unsafe*: the areas of SOTIF (ISO 21448). Values that the literature has lost are settings
+(`rss_shield.shield.risk.assumed()` lists them), and what stands here is about their defaults:
+{len(RiskSettings._fields)} settings of `RiskSettings()`, mode "iso" unless it says "radial".
 """
 
 
@@ -152,12 +154,16 @@ def _half_extents(situation: Situation) -> tuple[float, float]:
     return (across, along) if situation.crosses else (along, across)
 
 
+def _is_too_near(table: str, rows: pd.DataFrame) -> Any:
+    return rows[f"{table} margin"] < 0.0
+
+
 # name in the table -> from when on it holds
 REACTIONS: dict[str, Callable[[pd.DataFrame], Any]] = {
     "RDSI unknown": lambda rows: rows["rdsi"] >= rows["lower"],
     "RDSI known unsafe": lambda rows: rows["rdsi"] > rows["upper"],
     "TTC < 4 s": lambda rows: rows["ttc"] < 4.0,
-    **{f'RSS "{name}"': lambda rows, name=name: rows[f"{name} margin"] < 0.0 for name in TABLES},
+    **{f'RSS "{name}"': partial(_is_too_near, name) for name in TABLES},
 }
 
 
@@ -169,7 +175,8 @@ def reaction_time(rows: pd.DataFrame, holds: Any) -> float:
 
 
 def last_moment(situation: Situation, v: float) -> float:
-    """Time before the contact at which braking at `HARD` just avoids it [s]: to the speed of who is ahead, or to rest."""
+    """Time before the contact at which braking at `HARD` just avoids it [s]: to the speed of who is ahead, or to "
+    "rest."""
     closing = v - (0.0 if situation.crosses else situation.speed)
     return closing / (2 * HARD)
 
@@ -197,11 +204,12 @@ def reaction_part(frame: pd.DataFrame, radial: pd.DataFrame) -> str:
     return "\n\n".join(
         [
             "## Who reacts first",
-            f"Six situations after the tests of emergency braking, at constant speeds up to the contact. Seconds before it at "
-            f"which each measure begins to warn for good, the ego at {SHOWN} km/h, and in brackets from the least to the most "
-            f"over {EGO_SPEEDS[0]} to {EGO_SPEEDS[-1]} km/h in steps of 10 (n = {len(EGO_SPEEDS)}, no chance in it). Observed "
-            f"from {BEFORE:g} s before the contact on, so {BEFORE:.1f} means all along. Last moment: when braking at {HARD:g} "
-            f"m/s² still avoids it. RSS: longitudinally and laterally too near, by the parameters of a preset.",
+            f"Six situations after the tests of emergency braking, at constant speeds up to the contact. Seconds "
+            f"before it at which each measure begins to warn for good, the ego at {SHOWN} km/h, and in brackets from "
+            f"the least to the most over {EGO_SPEEDS[0]} to {EGO_SPEEDS[-1]} km/h in steps of 10 (n = "
+            f"{len(EGO_SPEEDS)}, no chance in it). Observed from {BEFORE:g} s before the contact on, so {BEFORE:.1f} "
+            f"means all along. Last moment: when braking at {HARD:g} m/s² still avoids it. RSS: longitudinally and "
+            f"laterally too near, by the parameters of a preset.",
             markdown(rows),
             "![Risk, TTC and RSS before a contact](../risk.png)",
             _first_words(frame, radial),
@@ -217,8 +225,8 @@ def _first_words(frame: pd.DataFrame, radial: pd.DataFrame) -> str:
         part = frame[where]
         ahead = part["RDSI unknown"] - part["TTC < 4 s"]
         parts.append(
-            f"{name}: RDSI is in the unknown band before TTC falls below 4 s in {(ahead > 1e-9).sum()} of {len(part)} runs, by "
-            f"{ahead.median():.1f} s in the median ({ahead.min():.1f} to {ahead.max():.1f} s)"
+            f"{name}: RDSI is in the unknown band before TTC falls below 4 s in {(ahead > 1e-9).sum()} of {len(part)} "
+            f"runs, by {ahead.median():.1f} s in the median ({ahead.min():.1f} to {ahead.max():.1f} s)"
         )
     text = [f"- {part[0].upper()}{part[1:]}." for part in parts]
     for table in TABLES:
@@ -232,15 +240,14 @@ def _first_words(frame: pd.DataFrame, radial: pd.DataFrame) -> str:
     late = {name: int((frame[name] < frame["last moment"]).sum()) for name in REACTIONS}
     never = {name: int((frame[name] == 0.0).sum()) for name in REACTIONS}
     text.append(
-        "- Later than the last moment for braking, of "
-        f"{len(frame)} runs: "
+        f"- Later than the last moment for braking, of {len(frame)} runs: "
         + "; ".join(f"{name} {count} (of these {never[name]} never)" for name, count in late.items())
         + "."
     )
     change = radial["RDSI unknown"] - frame["RDSI unknown"]
     text.append(
-        f'- In mode "radial" the unknown band begins {change.median():+.1f} s earlier in the median ({change.min():+.1f} to '
-        f"{change.max():+.1f} s)."
+        f'- In mode "radial" the unknown band begins {change.median():+.1f} s earlier in the median '
+        f"({change.min():+.1f} to {change.max():+.1f} s)."
     )
     return "\n".join(text)
 
@@ -413,8 +420,8 @@ def areas_part(found: list[Case], rng: np.random.Generator) -> str:
     return "\n\n".join(
         [
             "## SOTIF areas",
-            "Share of the frames in each area by the critical source, with 95 % intervals of the bootstrap over episodes. Off: "
-            "the shield watches only.",
+            "Share of the frames in each area by the critical source, with 95 % intervals of the bootstrap over "
+            "episodes. Off: the shield watches only.",
             markdown(rows),
             "![SOTIF areas](../sotif.png)",
             _areas_words(found),
@@ -463,9 +470,9 @@ def confusion_part(found: list[Case], rng: np.random.Generator) -> str:
     """RSS danger against classes of the field, per road, of unshielded and shielded policies together and apart."""
     parts = ["## Does one imply the other?"]
     parts.append(
-        "Frames by class of the field and by RSS: dangerous is a frame on which the ego owes somebody a proper response, or "
-        "where roads cross has no plan that is clear of everybody. Shares of the row, with 95 % intervals of the bootstrap "
-        "over episodes."
+        "Frames by class of the field and by RSS: dangerous is a frame on which the ego owes somebody a proper "
+        "response, or where roads cross has no plan that is clear of everybody. Shares of the row, with 95 % "
+        "intervals of the bootstrap over episodes."
     )
     rows: list[Any] = [("road", "shield", "RSS", "frames", *AREAS)]
     words = []
@@ -500,9 +507,9 @@ def _implications(road: str, shield: str, played: list[Frames], rng: np.random.G
 
     off = {"monitor": "off", "override": "on"}[shield]
     return (
-        f"- `{road}`, shield {off} ({len(played)} episodes): of RSS-dangerous frames {share(risky, dangerous)} are unknown or "
-        f"known unsafe; of unknown or unsafe frames {share(dangerous, risky)} are RSS-dangerous, of known unsafe ones "
-        f"{share(dangerous, unsafe)}."
+        f"- `{road}`, shield {off} ({len(played)} episodes): of RSS-dangerous frames {share(risky, dangerous)} are "
+        f"unknown or known unsafe; of unknown or unsafe frames {share(dangerous, risky)} are RSS-dangerous, of known "
+        f"unsafe ones {share(dangerous, unsafe)}."
     )
 
 
@@ -511,12 +518,12 @@ def _overlap_words(found: list[Case]) -> str:
     dangerous = np.concatenate([one.dangerous for one in frames])
     state = np.concatenate([one.state for one in frames])
     total = np.concatenate([one.sum_state for one in frames])
-    missed = (dangerous & (state == 0)).sum()
+    missed = int((dangerous & (state == 0)).sum())
+    by_sum, by_one = (f"{100 * (which > 0).mean():.0f} %" for which in (total, state))
     return (
         f"Of all {spaced(int(dangerous.sum()))} RSS-dangerous frames without the shield's action the field calls "
-        f"{spaced(int(missed))} known safe by the critical source. By the sum of all sources "
-        f"{100 * (total > 0).mean():.0f} % of all frames are unknown or known unsafe, and {100 * (state > 0).mean():.0f} % by the "
-        f"critical one: sums saturate in traffic that is in no danger."
+        f"{spaced(missed)} known safe by the critical source. By the sum of all sources {by_sum} of all frames are "
+        f"unknown or known unsafe, and {by_one} by the critical one: sums saturate in traffic that is in no danger."
     )
 
 
