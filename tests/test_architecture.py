@@ -34,7 +34,7 @@ MAY_IMPORT = {
     "envs.roads": ROADS | BELOW,
     "envs.worlds": {"envs.stock"} | ROADS | BELOW,
     "envs.highway": ROADS | ENTRY | BELOW | {"envs.make", "shield.risk"},
-    "envs.fast": ROADS | ENTRY | BELOW,
+    "envs.fast": ROADS | ENTRY | BELOW | {"shield.risk"},
     "eval.trace_risk": {"shield.geometry", "shield.lanes", "shield.params", "shield.risk", "shield.trace"},
     "eval.viewer": {"eval.files", "eval.trace_risk", "shield.geometry", "shield.risk", "shield.trace"},
 }

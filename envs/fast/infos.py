@@ -13,6 +13,7 @@ from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.junctions.plans import PLAN_NAMES
 from rss_shield.shield.lanes.controller import response_name
 from rss_shield.shield.lanes.judge import DUTIES, VERDICTS
+from rss_shield.shield.risk import STATES
 
 
 def _names(texts) -> np.ndarray:
@@ -22,17 +23,21 @@ def _names(texts) -> np.ndarray:
 
 _BLAMES = _names(["", *VERDICTS])
 _DUTIES = _names(DUTIES)
+_STATES = _names(STATES)
 _RESPONSES = _names(response_name(sum_of_bits) for sum_of_bits in range(16))
 _AXES = _names([*(AXES[axes] for axes in range(len(AXES))), *(PLAN_NAMES[kind] for kind in range(len(PLAN_NAMES)))])
 
 
-def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None) -> dict:
+def step_infos(
+    steps: np.ndarray, scenario: Scenario, settings: Settings | None, risks: np.ndarray | None = None
+) -> dict:
     """Infos of a batch.
 
     Args:
       steps: `[E]` STEP.
       scenario: what was run.
       settings: of the shield, None = no shield.
+      risks: `[E]` RISK, None = nobody asked.
 
     Returns:
       Dictionary of arrays `[E]`: `speed`, `crashed`, `rewards` (one array per component), at intersections
@@ -52,6 +57,8 @@ def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None)
         infos["is_success"] = steps["success"]
     if settings is not None:
         infos |= _shield_infos(steps, settings)
+    if risks is not None and settings is not None:
+        infos |= _risk_infos(risks, settings.dt)
     return infos
 
 
@@ -106,6 +113,30 @@ def _shield_infos(steps: np.ndarray, settings: Settings) -> dict:
         "min_ttc": steps["min_ttc"],
         **{name: steps["comfort"][:, k] for k, name in enumerate(Comfort._fields)},
         "raw_reward": steps["raw_reward"],
+    }
+
+
+def _risk_infos(risks: np.ndarray, dt: float) -> dict:
+    return {
+        "risk": {
+            "rdsi": risks["rdsi"],
+            "lower": risks["lower"],
+            "upper": risks["upper"],
+            "state": _STATES[risks["state"]],
+            "partner": risks["partner"],
+            "largest": risks["largest"],
+            "total": risks["total"],
+            "state_of_total": _STATES[risks["state_of_total"]],
+            "ttc": risks["ttc"],
+            "thw": risks["thw"],
+            "drac": risks["drac"],
+        },
+        "max_rdsi": risks["max_rdsi"],
+        "max_total_rdsi": risks["max_total_rdsi"],
+        **{f"time_{name}": risks[name] * dt for name in STATES},
+        "band_risk": risks["band_risk"],
+        "min_thw": risks["min_thw"],
+        "max_drac": risks["max_drac"],
     }
 
 

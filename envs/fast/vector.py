@@ -13,6 +13,7 @@ from rss_shield.envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, 
 from rss_shield.envs.fast.infos import info_of, step_infos
 from rss_shield.envs.fast.recording import Recording
 from rss_shield.envs.options import Settings
+from rss_shield.shield.risk import RiskSettings
 
 _MODES = {
     AutoresetMode.SAME_STEP: SAME_STEP,
@@ -53,6 +54,7 @@ class FastVectorEnv(VectorEnv):
       penalty_by_change: its mean change of acceleration.
       autoreset_mode: see above.
       threads: threads that share the work. Results do not depend on it.
+      risk: settings of the driving safety field that is measured around each ego, too; None = not measured.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
@@ -66,6 +68,7 @@ class FastVectorEnv(VectorEnv):
         autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
         threads: int = 1,
         penalty_by_change: bool = False,
+        risk: RiskSettings | None = None,
     ) -> None:
         self.scenario = scenario
         self.settings = settings
@@ -76,7 +79,8 @@ class FastVectorEnv(VectorEnv):
         self.action_space = batch_space(scenario.action_space, num_envs)
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
         mode = _MODES[autoreset_mode]
-        self.engine = Engine(scenario, num_envs, settings, intervention_penalty, mode, threads, penalty_by_change)
+        rules = settings, intervention_penalty, mode, threads, penalty_by_change, risk
+        self.engine = Engine(scenario, num_envs, *rules)
         self.recording = Recording(self.engine)
         self._everywhere = np.ones(num_envs, bool)
         self._decided = np.zeros(num_envs, bool)  # not where the last call began an episode
@@ -96,7 +100,7 @@ class FastVectorEnv(VectorEnv):
         self.recording.begin(restarted)
         self._began[restarted] = perf_counter()
         self._decided = np.zeros(self.num_envs, bool)
-        self._infos = self._told(outputs.steps, self._decided)
+        self._infos = self._told(outputs.steps, outputs.risks, self._decided)
         return self._shaped(outputs.observations), _marked(self._infos, restarted, self._decided)
 
     def step(self, actions):
@@ -117,7 +121,7 @@ class FastVectorEnv(VectorEnv):
 
         actions = np.asarray(actions)
         self._decided = ~ended if same_step else ~began if next_step else self._everywhere
-        self._infos = self._told(outputs.steps, self._decided, actions)
+        self._infos = self._told(outputs.steps, outputs.risks, self._decided, actions)
         infos = _marked(self._infos, self._everywhere, self._decided)
         if ended.any():
             if same_step:
@@ -137,7 +141,7 @@ class FastVectorEnv(VectorEnv):
         self.engine.close()
 
     def _finals(self, outputs: Outputs, ended, actions) -> dict:
-        finals = self._told(outputs.final_steps, ended, actions)
+        finals = self._told(outputs.final_steps, outputs.final_risks, ended, actions)
         finals["episode"] = self._episode(outputs.final_steps)
         return {
             "final_obs": self._shaped(outputs.final_observations),
@@ -146,9 +150,9 @@ class FastVectorEnv(VectorEnv):
             "_final_info": ended,
         }
 
-    def _told(self, steps, decided, actions=None) -> dict:
+    def _told(self, steps, risks, decided, actions=None) -> dict:
         """Infos, with the actions where one was decided upon."""
-        infos = step_infos(steps, self.scenario, self.settings)
+        infos = step_infos(steps, self.scenario, self.settings, risks)
         if actions is None:
             actions = np.zeros(self.action_space.shape, self.action_space.dtype)
         infos["action"] = np.where(decided.reshape(-1, *[1] * (actions.ndim - 1)), actions, actions.dtype.type(0))

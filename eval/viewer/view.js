@@ -12,16 +12,22 @@ function readColours() {
 
 const AHEAD = 0, BEHIND = 1, LEFT = 2, RIGHT = 3;
 
+const tiles = new Map();
+
 /** Strokes at 45 degrees in one colour, the same size on the screen whatever the zoom. */
 function hatch(context, name, ratio, scale) {
-  const tile = document.createElement("canvas"), size = Math.round(8 * ratio);
-  tile.width = tile.height = size;
-  const pen = tile.getContext("2d");
-  pen.strokeStyle = colour[name]; pen.lineWidth = 2 * ratio;
-  pen.beginPath();
-  for (const shift of [-size, 0, size]) { pen.moveTo(shift, size); pen.lineTo(shift + size, 0); }
-  pen.stroke();
-  const pattern = context.createPattern(tile, "repeat");
+  const key = `${colour[name]} ${ratio}`;
+  if (!tiles.has(key)) {
+    const tile = document.createElement("canvas"), size = Math.round(8 * ratio);
+    tile.width = tile.height = size;
+    const pen = tile.getContext("2d");
+    pen.strokeStyle = colour[name]; pen.lineWidth = 2 * ratio;
+    pen.beginPath();
+    for (const shift of [-size, 0, size]) { pen.moveTo(shift, size); pen.lineTo(shift + size, 0); }
+    pen.stroke();
+    tiles.set(key, tile);
+  }
+  const pattern = context.createPattern(tiles.get(key), "repeat");
   pattern.setTransform(new DOMMatrix().scale(1 / scale));
   return pattern;
 }
