@@ -22,7 +22,7 @@ class Charts {
     Object.assign(this, { root, episodes, seek, charts: [] });
     this.end = Math.max(...episodes.map((episode) => episode.duration), 1e-9);
     for (const chart of CHARTS) if (chart.series.slice(0, 1).some((name) => this.known(name))) this.add(chart, 74);
-    this.add({ title: "Duties", more: "what changed the command; the proper response owed", strips: true }, 22 * episodes.reduce((n, e) => n + e.egos.length, 0) * 2 + 4);
+    if (episodes.some((e) => e.egos.some((ego) => ego.shield))) this.add({ title: "Duties", more: "what changed the command; the proper response owed", strips: true }, 22 * episodes.reduce((n, e) => n + e.egos.length, 0) * 2 + 4);
     const axis = document.createElement("canvas");
     axis.style.height = "18px"; root.append(axis); this.axis = axis;
   }

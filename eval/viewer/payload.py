@@ -9,7 +9,19 @@ import numpy as np
 from rss_shield.eval.trace_risk import risk_of_trace
 from rss_shield.shield.geometry import wrap_angle
 from rss_shield.shield.risk import RiskSettings
-from rss_shield.shield.trace import CHANGED_BY, PLANS, RESPONSES, SIDES, SIGNALS, Contact, Ego, Event, Lane, Trace
+from rss_shield.shield.trace import (
+    CHANGED_BY,
+    PLANS,
+    RESPONSES,
+    SIDES,
+    SIGNALS,
+    Contact,
+    Ego,
+    Event,
+    Lane,
+    Trace,
+    ego_of,
+)
 
 CENTI, MILLI = 100, 1000  # steps of what is kept: 1 cm, 1 mrad
 AHEAD, BEHIND, LEFT, RIGHT = range(len(SIDES))
@@ -43,7 +55,7 @@ def payload(trace: Trace, label: str, settings: RiskSettings = RiskSettings()) -
             {"x": _round(light.x), "y": _round(light.y), "heading": _round(light.heading), "signal": runs(light.signal)}
             for light in trace.lights
         ],
-        "egos": [_ego(trace, ego, settings) for ego in trace.egos],
+        "egos": [_ego(trace, ego, settings) for ego in trace.egos or (_blank(trace),)],
         "events": [
             {"frame": _frame(trace, event.time), "kind": event.kind, "text": _event_text(trace, event, names)}
             for event in _told_once(trace.events)
@@ -204,12 +216,20 @@ def _user(trace: Trace, i: int, name: str) -> dict[str, Any]:
     }
 
 
+def _blank(trace: Trace) -> Ego:
+    """Who is looked at where nobody had a shield: the one that touched somebody first, or that is there longest."""
+    contacts = sorted(trace.contacts, key=lambda contact: contact.time)
+    user = contacts[0].user if contacts else int(np.argmax(trace.users.present.sum(axis=0)))
+    return ego_of(user, len(trace.time))
+
+
 def _ego(trace: Trace, ego: Ego, settings: RiskSettings) -> dict[str, Any]:
     users, i = trace.users, ego.user
     offset = [float(points[0, 0]) for points in trace.paths]
     start = np.array([offset[k] if k >= 0 else 0.0 for k in ego.path])
     return {
         "user": i,
+        "shield": bool(trace.egos),
         "gap": [packed(column, CENTI) for column in ego.gap.T],
         "required": [packed(column, CENTI) for column in ego.required.T],
         "neighbour": [runs(column) for column in ego.neighbour.T],
@@ -247,6 +267,8 @@ def _series(trace: Trace, ego: Ego, settings: RiskSettings) -> dict[str, tuple[i
     """Name -> scale, numbers of each time series."""
     users, i = trace.users, ego.user
     acceleration = users.acceleration[:, i]
+    if np.isnan(acceleration).all():  # nobody wrote down the commands
+        acceleration = np.append(np.diff(users.speed[:, i]), np.nan) / trace.dt
     risk = risk_of_trace(trace, i, settings)
     margin = np.minimum(ego.gap - ego.required, LONGEST)
     beside = np.fmin(margin[:, LEFT], margin[:, RIGHT])

@@ -174,17 +174,21 @@ class Player {
   tell({ episode, now, verdict }, k) {
     const cells = [];
     episode.egos.forEach((ego, i) => {
-      const of = episode.egos.length > 1 ? `${episode.users[ego.user].name}: ` : "", s = ego.series, at = (name) => (s[name] ? s[name][k] : NaN);
+      const of = episode.egos.length > 1 || !ego.shield ? `${episode.users[ego.user].name}: ` : "", s = ego.series, at = (name) => (s[name] ? s[name][k] : NaN);
       const partner = episode.users[ego.partner[k]];
       cells.push([`${of}speed`, `${plain(at("speed"), 1)} m/s`]);
-      cells.push([`${of}acceleration: wanted → done`, `${signed(at("wanted"), 1)} → ${signed(at("acceleration"), 1)} m/s²`, true]);
-      cells.push([`${of}steering: wanted → done`, `${signed(at("wanted_steering"), 1)} → ${signed(at("steering"), 1)}°`, true]);
-      cells.push([`${of}changed by`, CHANGED_NAMES[ego.changedBy[k]] || "nothing"]);
-      cells.push([`${of}proper response`, RESPONSE_NAMES[ego.response[k]] || "none"]);
-      cells.push([`${of}nearest to danger`, partner ? `${partner.name}${ego.dangerous[k] ? ", dangerous" : ""}` : "nobody"]);
-      if (ego.required[AHEAD].some((v) => v === v)) cells.push([`${of}ahead: has / needs`, `${plain(ego.gap[AHEAD][k], 1)} / ${plain(ego.required[AHEAD][k], 1)} m`]);
-      if (ego.plan.some((p) => p)) cells.push([`${of}plan`, PLAN_NAMES[ego.plan[k]] || "none"]);
-      if (s.rdsi) cells.push([`${of}RDSI`, `${plain(at("rdsi"), 2)} ${at("rdsi") > at("upper") ? "known unsafe" : at("rdsi") >= at("lower") ? "unknown" : "known safe"}`, true]);
+      if (!ego.shield) {
+        cells.push([`${of}acceleration`, `${signed(at("acceleration"), 1)} m/s²`]);
+      } else {
+        cells.push([`${of}acceleration: wanted → done`, `${signed(at("wanted"), 1)} → ${signed(at("acceleration"), 1)} m/s²`, true]);
+        cells.push([`${of}steering: wanted → done`, `${signed(at("wanted_steering"), 1)} → ${signed(at("steering"), 1)}°`, true]);
+        cells.push([`${of}changed by`, CHANGED_NAMES[ego.changedBy[k]] || "nothing"]);
+        cells.push([`${of}proper response`, RESPONSE_NAMES[ego.response[k]] || "none"]);
+        cells.push([`${of}nearest to danger`, partner ? `${partner.name}${ego.dangerous[k] ? ", dangerous" : ""}` : "nobody"]);
+        if (ego.required[AHEAD].some((v) => v === v)) cells.push([`${of}ahead: has / needs`, `${plain(ego.gap[AHEAD][k], 1)} / ${plain(ego.required[AHEAD][k], 1)} m`]);
+        if (ego.plan.some((p) => p)) cells.push([`${of}plan`, PLAN_NAMES[ego.plan[k]] || "none"]);
+      }
+      if (s.rdsi) cells.push([`${of}RDSI, area`, `${plain(at("rdsi"), 2)} ${at("rdsi") > at("upper") ? "unsafe" : at("rdsi") >= at("lower") ? "unknown" : "safe"}`]);
     });
     now.replaceChildren(...cells.map(([name, value, wide]) => {
       const cell = document.createElement("div"), small = document.createElement("small"), span = document.createElement("span");
@@ -257,7 +261,7 @@ class Player {
     };
     const junction = this.episodes.some((e) => e.paths.length);
     const rows = [
-      ["the ego", car("ego", "ink", 1)], ["whom its shield is about", car("user", "caution", 2)], ["in danger with the ego", car("user", "danger", 3)],
+      [this.episodes.some((e) => e.egos.some((ego) => ego.shield)) ? "the ego" : "who is looked at", car("ego", "ink", 1)], ["whom its shield is about", car("user", "caution", 2)], ["in danger with the ego", car("user", "danger", 3)],
       ["acceleration that the agent wanted", arrow("card")], ["acceleration that was done", arrow("ink")],
       ["required distance, kept", bar("space", "space")], ["required distance, somebody inside", bar("danger", "danger", true)],
       ...(junction ? [["others' way across", bar("area", "area", true)], ["plan: stop, with a bar where", stroke("ego", [6, 3])], ["plan: go", stroke("ego", [])]] : []),

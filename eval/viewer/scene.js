@@ -95,7 +95,7 @@ class User {
 
 class Ego {
   constructor(packed, episode) {
-    this.user = packed.user;
+    this.user = packed.user; this.shield = packed.shield;
     const side = (name, scale) => packed[name].map((column) => numbers(column, scale));
     this.gap = side("gap", 100); this.required = side("required", 100);
     this.neighbour = packed.neighbour.map(runs);

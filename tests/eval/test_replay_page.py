@@ -306,6 +306,18 @@ def test_where_roads_cross_plan_ways_and_lights_are_drawn(open_page):
     assert "go" in page.text_content(".now")
 
 
+def test_a_recording_without_any_shield_shows_who_touched_whom(open_page):
+    trace = cut_in(False).replaced(egos=(), meta={})
+    page = open_page([trace])
+    page.keyboard.press("End")
+    assert page.text_content(".panel h2 .outcome") == "contact after 2.0 s: 0 is to blame"
+    assert "0: speed" in page.text_content(".now") and "proper response" not in page.text_content(".now")
+    headings = page.text_content("#charts")
+    assert "RDSI" in headings and "Duties" not in headings
+    speed = page.evaluate("[...player.episodes[0].egos[0].series.acceleration]")
+    assert max(map(abs, speed[:-1])) == 0.0  # derived from speeds, which never change
+
+
 @pytest.mark.parametrize("width", [360, 1280])
 def test_nothing_is_wider_than_the_screen(open_page, width):
     page = open_page([cut_in(False), cut_in(True)], viewport={"width": width, "height": 740})
