@@ -29,6 +29,7 @@ from rss_shield.shield.table import table_for
 LANES, PLANS = range(2)  # distances along the lane (Defs. 1-10), or plans through junctions (Defs. 14-18)
 MODES = ("override", "monitor")
 WAITING = ("line", "anywhere")
+CAR_MASS = 1500.0  # of everybody [kg]: highway-env's vehicles have none
 TRAFFIC = ("stock", "compliant")  # how everybody else drives
 PENALTIES = ("response", "change")  # what an intervention penalty is charged for
 REPLACES = ("frame", "decision")  # what an action that is not permitted is replaced on
@@ -171,6 +172,19 @@ class Options:
         own = self.judge_params is None
         preset = self.params_in(env) if own else preset_of(self.judge_params, default_preset(env), "judge_params")
         return preset, rules_of(self.rules) if self.judge_rules is None else rules_of(self.judge_rules, "judge_rules")
+
+
+def check_risk(risk: Any) -> RiskSettings | None:
+    """Settings of the measure of risk, or None if it is off.
+
+    Raises:
+      ValueError: neither a truth value nor settings in their ranges.
+    """
+    if isinstance(risk, RiskSettings):
+        return RiskSettings.validated(**risk._asdict())
+    if not isinstance(risk, bool):
+        raise ValueError(f"risk = {risk!r}: expected True, False or RiskSettings")
+    return RiskSettings() if risk else None
 
 
 def split(arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -46,6 +46,14 @@ METRICS = (
     Metric("comfortable_share", "comfortable", "%", "mean", 100, 0, (0, 1)),
     Metric("min_time_gap", "min time gap", "s", "median", 1, 1, (0, math.inf)),
     Metric("min_ttc", "min TTC", "s", "median", 1, 1, (0, math.inf)),
+    # where risk is measured
+    Metric("min_thw", "min THW", "s", "median", 1, 1, (0, math.inf)),
+    Metric("max_drac", "max DRAC", "m/s²", "median", 1, 1, (0, math.inf)),
+    Metric("max_rdsi", "max RDSI", "", "median", 1, 2),
+    Metric("time_known_safe", "known safe", "s", "mean", 1, 1, (0, math.inf)),
+    Metric("time_unknown", "unknown", "s", "mean", 1, 1, (0, math.inf)),
+    Metric("time_known_unsafe", "known unsafe", "s", "mean", 1, 1, (0, math.inf)),
+    Metric("band_risk", "band risk", "s", "mean", 1, 1, (0, math.inf)),
 )
 
 

@@ -12,6 +12,7 @@ from rss_shield.envs._numpy.floats import norm
 from rss_shield.envs._numpy.ufuncs import arctan, tan
 from rss_shield.envs.fast.collisions import is_near, overlap
 from rss_shield.envs.fast.neighbours import Distances, Past, car_of, measure, row_before, start_past
+from rss_shield.envs.fast.risk import look_at_risk
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network
 from rss_shield.envs.roads.steering import MAX_SLIP
@@ -150,7 +151,7 @@ def carry_over(episode, cars, crossings, ego, watch):
 
 
 @inner
-def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, settings, step):
+def watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watch, settings, step):
     """Restrict the ego's command on one frame, unless it has had its contact.
 
     Args:
@@ -160,6 +161,7 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, sett
       sight: this frame's.
       distances, plans: `Distances` or `Plans`; the other is None.
       ride: RIDE.
+      meter: of risk; None = nobody asked.
       watch: `Watch`.
       settings: `envs.highway.ego.Settings`.
       step: STEP, the tally is kept there.
@@ -174,6 +176,7 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, sett
         gap = sight.z[0]
     ego = cars[episode.ego]
     ride_on(ride, ego.speed, ego.heading, gap, settings.table.dt)
+    look_at_risk(cars, episode, lanes, sight, distances, meter)
 
 
 @inner

@@ -8,16 +8,22 @@ import numpy as np
 
 from rss_shield.envs.fast.config import EXIT, INTERSECTION, Scenario
 from rss_shield.envs.options import Settings
+from rss_shield.shield.risk import STATES
 from rss_shield.shield.tally import shield_infos
 
+_STATES = np.array(list(STATES), object)
 
-def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None) -> dict:
+
+def step_infos(
+    steps: np.ndarray, scenario: Scenario, settings: Settings | None, risks: np.ndarray | None = None
+) -> dict:
     """Infos of a batch.
 
     Args:
       steps: `[E]` STEP.
       scenario: what was run.
       settings: of the shield, None = no shield.
+      risks: `[E]` RISK, None = nobody asked.
 
     Returns:
       Dictionary of arrays `[E]`: `speed`, `crashed`, `rewards` (one array per component), at intersections
@@ -37,9 +43,35 @@ def step_infos(steps: np.ndarray, scenario: Scenario, settings: Settings | None)
         infos["is_success"] = steps["success"]
     if settings is not None:
         infos |= shield_infos(steps, settings.table.dt) | {"time": steps["time"], "raw_reward": steps["raw_reward"]}
+    if risks is not None and settings is not None:
+        infos |= _risk_infos(risks, settings.table.dt)
     return infos
 
 
 def _of_one_agent(values: np.ndarray) -> np.ndarray:
     """As tuples with one value each, which is what highway-env says of its agents."""
     return np.fromiter(zip(values.tolist(), strict=True), object, len(values))
+
+
+def _risk_infos(risks: np.ndarray, dt: float) -> dict:
+    return {
+        "risk": {
+            "rdsi": risks["rdsi"],
+            "lower": risks["lower"],
+            "upper": risks["upper"],
+            "state": _STATES[risks["state"]],
+            "partner": risks["partner"],
+            "largest": risks["largest"],
+            "total": risks["total"],
+            "state_of_total": _STATES[risks["state_of_total"]],
+            "ttc": risks["ttc"],
+            "thw": risks["thw"],
+            "drac": risks["drac"],
+        },
+        "max_rdsi": risks["max_rdsi"],
+        "max_total_rdsi": risks["max_total_rdsi"],
+        **{f"time_{name}": risks[name] * dt for name in STATES},
+        "band_risk": risks["band_risk"],
+        "min_thw": risks["min_thw"],
+        "max_drac": risks["max_drac"],
+    }

@@ -8,9 +8,9 @@ import gymnasium as gym
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
 from rss_shield.envs.highway.ego import ShieldedEgo
-from rss_shield.envs.highway.risk import RiskMeter, check_risk
+from rss_shield.envs.highway.risk import RiskMeter
 from rss_shield.envs.highway.step import attach, shield_on
-from rss_shield.envs.options import Options, Settings, check_mode, settings_for
+from rss_shield.envs.options import Options, Settings, check_mode, check_risk, settings_for
 from rss_shield.shield.filters.answer import RSS, Filter
 from rss_shield.shield.lanes.correction import NEAREST
 

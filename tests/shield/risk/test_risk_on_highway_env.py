@@ -8,7 +8,7 @@ from examples import CASES, EXAMPLES, MODES, rounded
 from highway_env.vehicle.behavior import IDMVehicle
 
 from rss_shield import MultiAgentShield, ShieldWrapper, make
-from rss_shield.envs.highway.risk import _line
+from rss_shield.envs.roads.lines import line_beside
 from rss_shield.shield.risk import STATES, RiskSettings, band_risk
 
 EPISODE = (
@@ -152,7 +152,8 @@ def test_lines_are_read_from_both_lanes_that_they_part(lane, sides):
     vehicle = env.unwrapped.vehicle
     vehicle.lane_index = (*vehicle.lane_index[:2], lane)
     vehicle.lane = vehicle.road.network.get_lane(vehicle.lane_index)
-    assert (_line(vehicle, -1), _line(vehicle, 1)) == sides
+    network, lane = vehicle.road.network, vehicle.lane_index
+    assert (line_beside(network, lane, -1), line_beside(network, lane, 1)) == sides
 
 
 @pytest.mark.parametrize("risk", ["yes", 1, None])
