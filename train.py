@@ -20,6 +20,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pandas as pd
+import tyro
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 import rss_shield
@@ -27,11 +28,12 @@ from rss_shield.agents.blocks import available_devices, train_in_blocks
 from rss_shield.agents.learner import Learner, learner_of
 from rss_shield.agents.load import load_policy, policy_of
 from rss_shield.command_line import ConfigFile, fail, parsed, shown
+from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.envs.fast.config import Unsupported
 from rss_shield.envs.highway.idm_ego import make_idm_vec
 from rss_shield.envs.make_vec import BACKENDS
-from rss_shield.envs.options import PENALTIES, PLANS, WAITING, default_preset, scheme_of
+from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, default_preset, scheme_of
 from rss_shield.eval import drivers, removal
 from rss_shield.eval.arms import ARMS, FROM_OPTIONS, SHIELDED, Arm, arm_named, table
 from rss_shield.eval.config_option import split_arguments, with_values
@@ -84,6 +86,9 @@ NAMES = "letters, digits and . , = + - _"
 LONGEST_NAME = 120
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
 FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
+DEFAULT_RULES = Rules()
+# options of the shield that have no place of their own in `setting`
+WRAPPED = ("rules", "examine", "traffic", "filter", "filter_at", "correction", "replace", "risk")
 FIRST_REMOVAL_SEED = 2 * 10**9  # likewise of the tests on the way, far from both
 
 
@@ -137,6 +142,23 @@ class Config:
     """Which routes it expects of others there: known (theirs), straight, or any that fits."""
     waiting: str = "line"
     """Where it may wait there: at the line, or anywhere that is in the way of nobody who is there."""
+    rules: tyro.conf.FlagConversionOff[Rules] = DEFAULT_RULES
+    """Duties and margins in force, for ablations: --rules.memory False; each that is changed costs the guarantee."""
+    examine: str = "table"
+    """Against whom plans through a junction are checked: table (whose ways meet the ego's), all, or one of the
+    heuristics geofence, walk, first-conflicting, first."""
+    traffic: str = "stock"
+    """How everybody else drives: stock, or compliant (under a shield of their own; on highway-env only)."""
+    filter: str = "rss"
+    """What acts in the shield's place, to compare with: rss (the shield itself), or what rss-shield's docs name."""
+    filter_at: float | None = None
+    """At what that filter steps in, where it has a threshold; its unit is the filter's."""
+    correction: str = "nearest"
+    """What a duty makes of a command: see `ShieldWrapper`."""
+    replace: str = "frame"
+    """When it replaces the agent's action: see `ShieldWrapper`."""
+    risk: bool = False
+    """Measure the driving safety field, too (on highway-env only)."""
     intervention_penalty: float = 0.0
     """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward. Arms with a
     penalty of their own, as penalty-0.5, keep theirs."""
@@ -271,6 +293,7 @@ def complete(config: Config, values: dict[tuple[str, ...], Any]) -> Config:
 def stored_config(options: dict[str, Any]) -> Config:
     """The options in a run's record; what was not recorded has its default."""
     known = {f.name: options[f.name] for f in fields(Config) if f.name in options}
+    known["rules"] = rules_of(known.get("rules", {}))
     for name in ("arms", "seeds"):
         known[name] = tuple(known[name])
     for name in ("ego", "other"):
@@ -332,21 +355,23 @@ def _tried_arm(config: Config, preset: Preset, arm: Arm) -> gym.Env:
 
 def original(config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any]) -> Callable[..., gym.Env]:
     """Builds an environment of the original simulator."""
-    return functools.partial(rss_shield.make, config.env_id, params=preset, **shield, **setting(config, arm))
+    options = {**wrapped(config), **shield, **setting(config, arm)}
+    return functools.partial(rss_shield.make, config.env_id, params=preset, **options)
 
 
 def batch(
     config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any], n_envs: int, **options: Any
 ) -> VectorEnv:
     """Environments of the chosen simulator side by side, as an arm needs them."""
-    options = {"backend": config.backend, **options, "params": preset, **shield, **setting(config, arm)}
+    given = {**wrapped(config), **shield, **setting(config, arm)}
+    options = {"backend": config.backend, **options, "params": preset, **given}
     return rss_shield.make_vec(config.env_id, n_envs, **options)
 
 
 def test_batch(config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any], n_envs: int) -> VectorEnv:
     """The same for tests, where the next episode begins when it is told to."""
     if arm.scripted and arm.settings["driver"] == "idm":
-        return make_idm_vec(config.env_id, n_envs, params=preset, **shield, **setting(config, arm))
+        return make_idm_vec(config.env_id, n_envs, params=preset, **wrapped(config), **shield, **setting(config, arm))
     return batch(config, preset, arm, shield, n_envs, autoreset_mode=AutoresetMode.DISABLED)
 
 
@@ -355,6 +380,13 @@ def setting(config: Config, arm: Arm) -> dict[str, Any]:
     conduct = {"entry": config.entry, "intent": config.intent, "waiting": config.waiting}
     configured = {**config.config, **arm.config}
     return {**conduct, "config": configured} if configured else conduct
+
+
+def wrapped(config: Config) -> dict[str, Any]:
+    """Other options of the shield's, as far as they are not its defaults; what an arm says comes before them."""
+    default = Options()
+    given = {name: getattr(config, name) for name in WRAPPED}
+    return {name: value for name, value in given.items() if value != getattr(default, name)}
 
 
 def model_path(folder: Path, arm: str, seed: int) -> Path:
@@ -476,6 +508,11 @@ def parse(arguments: list[str], default: Config) -> Config:
 
 def check(config: Config) -> None:
     """Refuse what is out of range, naming option, value and range. RSS parameters: see `resolve`."""
+    try:
+        rules_of(config.rules, "--rules")
+        Options(**wrapped(config))
+    except ValueError as error:
+        fail(PROGRAM, str(error))
     presets, devices = ["auto", *PRESETS], available_devices()
     for arm in config.arms:
         try:
@@ -543,7 +580,8 @@ def resolve(config: Config) -> Preset:
 def options_of(config: Config) -> dict[str, Any]:
     """Every option but those that only say where and how to start."""
     options = {f.name: getattr(config, f.name) for f in fields(config) if f.name not in _NOT_RECORDED}
-    return {**options, "ego": _given(config.ego), "other": _given(config.other)}
+    rules = {name: value for name, value, _ in changes(config.rules._asdict(), Rules()._asdict())}
+    return {**options, "ego": _given(config.ego), "other": _given(config.other), "rules": rules}
 
 
 def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
@@ -556,7 +594,7 @@ def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
             "per_frame": preset.per_frame,
             "source": preset.source,
             "roads_cross": scheme_of(env.unwrapped) == PLANS,  # otherwise entry, intent and waiting change nothing
-            "rules": Rules()._asdict(),  # the margins of the published table
+            "rules": config.rules._asdict(),  # the margins of the published table
         },
         "environment": env.unwrapped.config,  # type: ignore[attr-defined]  # the whole of it
         **{

@@ -30,7 +30,7 @@ from rss_shield.eval.stats import Interval, bootstrap_mean
 from rss_shield.shield.geometry import make_road
 from rss_shield.shield.lanes.frame import to_lane_frame_all
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
-from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.params import PRESETS, Rules, Table
 from rss_shield.shield.risk import RiskSettings, band_risk, risk_of, road_users, toward_leader
 
 ROADS = ("highway-fast-v0", "merge-v0", "intersection-v0")
@@ -142,7 +142,7 @@ def play_to_contact(situation: Situation, v: float, mode: str = "iso") -> pd.Dat
         }
         for name in TABLES:
             preset = PRESETS[name]
-            pair = assess(ego, other, preset.ego, preset.other, Rules(), DT)
+            pair = assess(ego, other, Table(preset.ego, preset.other, Rules(), DT))
             row[f"{name} margin"] = max(pair.margin_lon, pair.margin_lat)
         rows.append(row)
     return pd.DataFrame(rows)

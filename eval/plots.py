@@ -125,7 +125,7 @@ def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
         axes.set_ylim(bottom=0)
         figure.legend(title="Who broke their duty", loc="outside lower center", ncols=len(BLAMES))
         whiskers = "whiskers: 95 % Wilson intervals over episodes; left: ego or both, right: all"
-        figure.suptitle(f"{title}: who is to blame ({whiskers})", size=9)
+        figure.suptitle(f"{title}: who is to blame\n({whiskers})", size=8)
         save(figure, folder / "blame")
 
 

@@ -11,6 +11,8 @@ COMMANDS = {
     "record": ("rss_shield.eval.suite.record", "train", "play one episode and write down everything"),
     "judge": ("rss_shield.eval.suite.judge.command", "train", "who was to blame in any log"),
     "replay": ("rss_shield.eval.viewer.command", "train", "a page on which recorded episodes play"),
+    "sweep": ("rss_shield.eval.suite.sweep", "train", "run every task of an experiment file, here or on a cluster"),
+    "report": ("rss_shield.eval.paper.command", "train", "one page of what came out of runs and sweeps"),
 }
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"
 

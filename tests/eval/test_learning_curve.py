@@ -20,7 +20,7 @@ import rss_shield.eval.rollout
 from rss_shield.agents.blocks import train_in_blocks
 from rss_shield.agents.ppo import learner
 from rss_shield.eval.plots import joined_bins
-from rss_shield.eval.stats import completion_weights, weighted_mean, weighted_rate
+from rss_shield.eval.stats import completion_weights, weighted_mean, weighted_rate, wilson
 
 LONGEST = 20
 ENVS = 64
@@ -130,10 +130,10 @@ def test_a_cut_off_episode_passes_its_weight_on_to_those_that_lasted_longer():
 
 def test_equal_weights_give_the_ordinary_statistics():
     sample = [0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    assert weighted_rate(sample, np.full(10, 0.1)) == pytest.approx(rss_shield.eval.stats.wilson(2, 10))
+    assert weighted_rate(sample, np.full(10, 0.1))[:4] == pytest.approx(wilson(2, 10)[:4])
     mean = weighted_mean([1.0, 2.0, 3.0, 6.0], np.full(4, 0.25))
     # variance 14 / 4 = 3.5; 1.96 sqrt(3.5 / 4) = 1.833
-    assert mean == pytest.approx((3.0, 1.167, 4.833, 4), abs=1e-3)
+    assert mean[:4] == pytest.approx((3.0, 1.167, 4.833, 4), abs=1e-3)
 
 
 def test_the_words_for_no_contact_are_the_same_in_training_and_testing():

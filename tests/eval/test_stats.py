@@ -90,7 +90,7 @@ def test_wilson_covers_the_true_rate_about_95_percent_of_the_time(p):
 def test_the_bootstrap_median_of_three_values_spans_them():
     # A resample of 1, 2, 3 has median 1 when at least two of three draws are 1:
     # (1/3)^3 + 3 (1/3)^2 (2/3) = 7/27 = 26 % > 2.5 %, so both ends of the interval are extremes.
-    assert bootstrap_median([1, 2, 3], np.random.default_rng(0)) == (2.0, 1.0, 3.0, 3)
+    assert bootstrap_median([1, 2, 3], np.random.default_rng(0)) == (2.0, 1.0, 3.0, 3, "episodes")
 
 
 def test_the_bootstrap_mean_of_a_large_symmetric_sample_is_the_normal_interval():
@@ -123,7 +123,7 @@ def test_the_same_generator_gives_the_same_interval():
 @pytest.mark.parametrize("bootstrap", [bootstrap_mean, bootstrap_median])
 def test_small_and_constant_samples_get_honest_intervals(bootstrap):
     rng = np.random.default_rng(0)
-    assert bootstrap([2.5, 2.5, 2.5], rng) == (2.5, 2.5, 2.5, 3)
+    assert bootstrap([2.5, 2.5, 2.5], rng) == (2.5, 2.5, 2.5, 3, "episodes")
     single, empty = bootstrap([2.5], rng), bootstrap([], rng)
     assert (single.value, single.n) == (2.5, 1)
     assert np.isnan(single[1:3]).all()

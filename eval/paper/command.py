@@ -1,0 +1,75 @@
+"""`rss-shield report RUN...`: one page of what came out of runs and sweeps, to read, to print and to paste.
+
+    rss-shield report runs/highway-fast-v0
+    rss-shield report runs/highway-fast-v0 runs/merge-v0 runs/response-times --out runs/report
+
+Writes OUT/index.html (self-contained), report.md, report.tex, and figures/RUN/*.png and .pdf. Nothing is trained.
+"""
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from rss_shield.eval.paper.read import across_roads, section_of
+from rss_shield.eval.paper.render import write_report
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """One option a field."""
+
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """Folders of finished runs and sweeps."""
+    out: Path | None = None
+    """Folder of the report; by default report/ in the first run."""
+    title: str = "Shielded and unshielded agents compared"
+    """Heading of the page."""
+
+
+def write(runs: tuple[Path, ...], out: Path, title: str) -> Path:
+    """Write the report; returns the page.
+
+    Raises:
+      ValueError: no run, or a folder that holds no finished one.
+    """
+    if not runs:
+        raise ValueError("runs: expected at least one folder")
+    sections = [section_of(run, out / "figures" / run.name) for run in runs]
+    together = across_roads(runs, out / "figures" / "roads")
+    sections += [together] if together else []
+    write_report(out, title, sections, footer(runs))
+    return out / "index.html"
+
+
+def footer(runs: tuple[Path, ...]) -> str:
+    """From which code, versions and machines the numbers are."""
+    lines = []
+    for run in runs:
+        for name in ("config.json", "experiment.json"):
+            if (run / name).exists():
+                record = json.loads((run / name).read_text(encoding="utf-8"))
+                versions = record.get("versions", record)
+                packages = ", ".join(
+                    f"{package} {version}" for package, version in versions["packages"].items() if version
+                )
+                code = f"{versions['git_commit']}{' with changes' if versions['git_changes'] else ''}"
+                lines += [
+                    f"{run.name}: code {code}; Python {versions['python']}; {versions['platform']}; {versions['cpu']}"
+                ]
+                lines += [f"  {packages}"]
+    return "\n".join(lines)
+
+
+def run(arguments: list[str]) -> None:
+    """What a command line asks for."""
+    given = tyro.cli(Arguments, prog="rss-shield report", description=__doc__, args=arguments)
+    try:
+        page = write(given.runs, given.out or given.runs[0] / "report", given.title)
+    except (ValueError, OSError, IndexError) as error:
+        print(f"rss-shield report: error: {' '.join(str(error).split())}", file=sys.stderr)
+        raise SystemExit(2) from None
+    print(f"written: {page}, report.md, report.tex, figures/")

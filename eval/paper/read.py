@@ -1,0 +1,202 @@
+"""Runs and sweeps as sections of a report."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from rss_shield.eval import removal
+from rss_shield.eval.arms import ARMS
+from rss_shield.eval.frontier import plot_frontier
+from rss_shield.eval.metrics import summarise, with_outcomes
+from rss_shield.eval.pages import command
+from rss_shield.eval.paper import words
+from rss_shield.eval.paper.compared import as_texts, comparisons
+from rss_shield.eval.paper.figures import plot_comfort, plot_profiles
+from rss_shield.eval.paper.section import Figure, Section, Table
+from rss_shield.eval.plots import plot_blame, plot_learning_curve, save
+from rss_shield.eval.runs.points import groups_of, with_front
+from rss_shield.eval.runs.tables import plot_front, shown_metrics, texts, wide
+from rss_shield.eval.stats import Interval, interquartile_mean, probability_of_improvement
+from rss_shield.eval.table import legend, table_frame
+
+GROUPS = {  # tables of a run: headings of their metrics
+    "Safety": (
+        "crash",
+        "ego at fault",
+        "other at fault",
+        "inherited",
+        "none",
+        "min TTC",
+        "min time gap",
+        "near misses",
+    ),
+    "Performance": ("success", "time to goal", "return", "speed", "length", "frozen"),
+    "Shield and ride": ("overridden", "anticipated", "change", "rms jerk", "hard braking", "comfortable"),
+}
+INTERVALS = "[low, high]: 95 % interval over test episodes of these trained models; (low, high): over training seeds."
+
+
+def section_of(folder: Path, figures: Path) -> Section:
+    """The section of a run or a sweep.
+
+    Args:
+      folder: of results.
+      figures: folder that its figures are drawn into.
+
+    Raises:
+      ValueError: neither of both, or not finished.
+    """
+    figures.mkdir(parents=True, exist_ok=True)
+    if (folder / "experiment.json").exists() and (folder / "points.csv").exists():
+        return _of_sweep(folder, figures)
+    if (folder / "config.json").exists() and (folder / "episodes.csv").exists():
+        return _of_run(folder, figures)
+    expected = "a finished run (config.json, episodes.csv) or sweep (experiment.json, points.csv)"
+    raise ValueError(f"{folder}: expected {expected}")
+
+
+def _of_run(folder: Path, figures: Path) -> Section:
+    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
+    episodes = read_episodes(folder)
+    summary, compared = summarise(episodes), comparisons(episodes)
+    frame = table_frame(summary)
+    tables = [
+        Table(f"{folder.name}-{name.split()[0].lower()}", f"{name}. {INTERVALS}", turned(frame, headings))
+        for name, headings in GROUPS.items()
+        if any(heading.split(" [")[0] in headings for heading in frame.columns)
+    ]
+    if len(compared):
+        tables.append(
+            Table(
+                f"{folder.name}-compared",
+                "Differences to the first cell, paired by seed and test episode. only here / only first: episodes "
+                "in which one of both had the outcome.",
+                as_texts(compared),
+            )
+        )
+    return Section(
+        f"{config['env_id']} ({folder.name})",
+        words.of_run(episodes, summary, compared),
+        tables,
+        list(_figures_of_run(folder, figures, config, episodes, summary)),
+        legend(summary),
+        command(config),
+    )
+
+
+def _figures_of_run(folder: Path, figures: Path, config: dict[str, Any], episodes: pd.DataFrame, summary: pd.DataFrame):
+    road, models = str(config["env_id"]), [(arm, seed) for arm in config["arms"] for seed in config["seeds"]]
+    plot_blame(episodes, figures, road)
+    yield Figure("Who is to blame for the contacts of each cell.", figures / "blame.png")
+    paths = {model: folder / f"{model[0]}-seed{model[1]}" / "learning_curve.csv" for model in models}
+    curves = [
+        pd.read_csv(path).assign(arm=arm, train_seed=seed) for (arm, seed), path in paths.items() if path.exists()
+    ]
+    if curves:
+        plot_learning_curve(pd.concat(curves, ignore_index=True), figures, road)
+        text = "Training: return, crashes and faults while learning, and how often the shield intervenes."
+        yield Figure(text, figures / "learning_curve.png")
+    removals = removal.read_all(folder, models)
+    if len(removals):
+        removal.plot_removal(removals, figures, road)
+        yield Figure("The agent on its way through training, with the shield taken away.", figures / "removal.png")
+    called = {arm.called for arm in ARMS.values()}
+    if summary["train"].nunique() > 2 and set(summary["train"]) <= called:
+        plot_frontier(summary, figures, road)
+        yield Figure("Who needs the shield, and what it earns with it and without.", figures / "frontier.png")
+    if plot_comfort(summary, figures, road):
+        yield Figure("How the ride feels.", figures / "comfort.png")
+
+
+def _of_sweep(folder: Path, figures: Path) -> Section:
+    experiment = json.loads((folder / "experiment.json").read_text(encoding="utf-8"))["experiment"]
+    points = pd.read_csv(folder / "points.csv")
+    axes = [name for name in points.columns if name not in ("metric", "value", "low", "high", "n", "over")]
+    safety, performance = experiment["safety"], experiment["performance"]
+    table = with_front(wide(points, axes), safety, performance)
+    figure = plot_front(table, axes, safety, performance, experiment["name"])
+    save(figure, figures / "pareto")
+    over = ", ".join(sorted(set(points["over"])))
+    caption = f"Points of the sweep; [low, high]: 95 % intervals over {over}; ★: on the Pareto front of its panel."
+    inner = [name for name in axes if name not in ("environment", "policy", "test")]
+    groups = [(label, rows.tolist()) for label, rows in groups_of(table)]
+    return Section(
+        f"Sweep {experiment['name']}",
+        [experiment["about"], *words.of_sweep(table, inner, groups, safety, performance)],
+        [Table(experiment["name"], caption, texts(table, axes, shown_metrics(table, safety, performance)))],
+        [
+            Figure(
+                f"Safety and performance: {safety} against {performance}, with the Pareto front.",
+                figures / "pareto.png",
+            )
+        ],
+        command=f"rss-shield sweep experiments/{experiment['name']}.yaml",
+    )
+
+
+def read_episodes(folder: Path) -> pd.DataFrame:
+    return pd.read_csv(folder / "episodes.csv")
+
+
+def turned(frame: pd.DataFrame, headings: Sequence[str]) -> pd.DataFrame:
+    """The metrics of some headings, a cell a row."""
+    chosen = [name for name in frame.columns[2:] if name == "n" or name.split(" [")[0] in headings]
+    cells = (frame["train"] + " / " + frame["test"]).rename("train / test")
+    return pd.concat([cells, frame[chosen]], axis=1)
+
+
+def across_roads(folders: Sequence[Path], figures: Path) -> Section | None:
+    """What arms do on several roads together; None for fewer than two runs, or cells that they do not share."""
+    runs = [folder for folder in folders if (folder / "episodes.csv").exists() and (folder / "config.json").exists()]
+    if len(runs) < 2:
+        return None
+    returns = [
+        with_outcomes(read_episodes(folder)).groupby(["train", "test", "train_seed"])["return"].mean()
+        for folder in runs
+    ]
+    cells = [
+        cell for cell in dict.fromkeys(key[:2] for key in returns[0].index) if all(cell in r.index for r in returns)
+    ]
+    scores = {}
+    for cell in cells:
+        columns = []
+        for one in returns:
+            worst, best = (getattr(one.groupby(["train", "test"]).mean(), end)() for end in ("min", "max"))
+            columns.append((one.loc[cell].to_numpy() - worst) / (best - worst))
+        if len({len(column) for column in columns}) == 1:
+            scores[f"{cell[0]} / {cell[1]}"] = np.column_stack(columns)
+    if len(scores) < 2:
+        return None
+    figures.mkdir(parents=True, exist_ok=True)
+    plot_profiles(scores, figures, f"Performance profiles over {len(runs)} roads")
+    first, rng, rows = next(iter(scores)), np.random.default_rng(0), []
+    for name, table in scores.items():
+        middle = interquartile_mean(table, rng)
+        better = probability_of_improvement(table, scores[first], rng)
+        rows.append(
+            {
+                "train / test": name,
+                "seeds": str(len(table)),
+                "interquartile mean": _texted(middle),
+                f"better than {first}": "–" if name == first else _texted(better),
+            }
+        )
+    caption = (
+        "Returns of all roads together, on each from 0 (worst cell) to 1 (best). 95 % intervals over training seeds "
+        "(stratified bootstrap; too narrow with fewer than ten seeds)."
+    )
+    text = "Profiles: the share of runs (a seed on a road) whose return is above each value; a band is 95 % over seeds."
+    return Section(
+        "All roads together",
+        [f"{len(runs)} roads: {', '.join(folder.name for folder in runs)}."],
+        [Table("roads", caption, pd.DataFrame(rows))],
+        [Figure(text, figures / "profiles.png")],
+    )
+
+
+def _texted(interval: Interval) -> str:
+    return f"{interval.value:.2f} [{interval.low:.2f}, {interval.high:.2f}]"

@@ -1,0 +1,97 @@
+"""What came out of a run, in sentences. Each number is in a table as well."""
+
+import pandas as pd
+
+from rss_shield.eval.metrics import with_outcomes
+from rss_shield.eval.stats import clopper_pearson
+
+
+def of_run(episodes: pd.DataFrame, summary: pd.DataFrame, compared: pd.DataFrame) -> list[str]:
+    """The paragraphs of a run of `rss-shield train`.
+
+    Args:
+      episodes: all test episodes.
+      summary: as of `eval.metrics.summarise`.
+      compared: as of `eval.paper.compared.comparisons`.
+    """
+    outcomes = with_outcomes(episodes)
+    seeds, cells = episodes["train_seed"].nunique(), summary[["train", "test"]].drop_duplicates()
+    paragraphs = [
+        f"{len(cells)} cells (an arm, tested one way), {len(episodes)} test episodes, {seeds} training "
+        f"seed{'s' if seeds > 1 else ''}."
+    ]
+    for test, where in (("on", "with the shield on"), ("off", "with the shield off")):
+        tested = outcomes[outcomes["test"] == test]
+        if len(tested):
+            paragraphs.append(_faults(tested, where))
+    values = summary.pivot_table(index=["train", "test"], columns="metric", values="value", sort=False, observed=True)
+    best = values["return"].idxmax()
+    paragraphs.append(f"Highest return: {_cell(best)}, {values.loc[best, 'return']:.1f} per episode.")
+    harmless = values[values["at_fault"] == 0]
+    if len(harmless) and harmless["return"].idxmax() != best:
+        safest = harmless["return"].idxmax()
+        paragraphs.append(
+            f"Highest return without a fault of the ego: {_cell(safest)}, {values.loc[safest, 'return']:.1f}."
+        )
+    if "override_share" in values:
+        on = values[[test == "on" for _, test in values.index]]
+        if len(on):
+            most, least = on["override_share"].idxmax(), on["override_share"].idxmin()
+            shares = 100 * on["override_share"]
+            text = f"The shield overrides {shares[most]:.1f} % of the frames of who is {_cell(most)}"
+            paragraphs.append(text + (f", {shares[least]:.1f} % of who is {_cell(least)}." if most != least else "."))
+    tests = compared[compared["p_holm"].notna()]
+    if len(tests):
+        beyond = int((tests["p_holm"] < 0.05).sum())
+        paragraphs.append(
+            f"Of {len(tests)} paired comparisons of crash and fault with the first cell, {beyond} differ by more than "
+            "chance (McNemar, p < 0.05 after Holm's correction; over episodes of these models, not over seeds)."
+        )
+    return paragraphs
+
+
+def _faults(tested: pd.DataFrame, where: str) -> str:
+    n, faults, crashes = len(tested), int(tested["at_fault"].sum()), int(tested["crash"].sum())
+    bound = clopper_pearson(faults, n)
+    text = f"Tested {where}: {crashes} contacts in {n} episodes, {faults} of them the ego's fault "
+    text += (
+        f"({100 * bound.value:.2g} %, 95 % interval {100 * bound.low:.2g} to {100 * bound.high:.2g} %, over episodes"
+    )
+    rates = tested.groupby("train", sort=False)["at_fault"].mean()
+    if len(rates) > 1 and faults:
+        low, high = (f"{100 * rates[arm]:.0f} % ({arm})" for arm in (rates.idxmin(), rates.idxmax()))
+        text += f"; by training from {low} to {high}"
+    unexplained = int(tested["none"].sum())
+    return (
+        text + ")" + (f"; {unexplained} that nobody's duty explains, which would be a bug" if unexplained else "") + "."
+    )
+
+
+def _cell(cell: tuple[str, str]) -> str:
+    train, test = cell
+    trained = {"on": "trained with the shield", "off": "trained without the shield"}.get(train, train)
+    return f"{trained}, tested with it {test}"
+
+
+def of_sweep(
+    table: pd.DataFrame, axes: list[str], groups: list[tuple[str, list[int]]], safety: str, performance: str
+) -> list[str]:
+    """The paragraphs of a sweep.
+
+    Args:
+      table: as of `eval.runs.points.with_front`.
+      axes: columns that tell points apart.
+      groups: label and rows of the points that compete.
+    """
+    paragraphs = []
+    for label, rows in groups:
+        points = table.iloc[rows]
+        front = points[points["front"]].sort_values(performance, ascending=False)
+        best = front.iloc[0]
+        named = ", ".join(f"{name} = {best[name]}" for name in axes)
+        where = f"{label}: " if label else ""
+        paragraphs.append(
+            f"{where}{len(front)} of {len(points)} points are on the Pareto front of {safety} and {performance}. "
+            f"The best {performance} there is {best[performance]:.3g}, with {safety} {best[safety]:.3g} ({named})."
+        )
+    return paragraphs

@@ -1,0 +1,61 @@
+"""A task without training: a scripted policy on a row of episodes."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from gymnasium.vector import AutoresetMode
+
+from rss_shield.envs.make import make
+from rss_shield.envs.make_vec import make_vec
+from rss_shield.eval.rollout import evaluate, run_episode
+from rss_shield.eval.runs.store import Files
+from rss_shield.eval.suite.policies import Scripted
+from rss_shield.eval.suite.setup import setup_of
+
+SIDE_BY_SIDE = 256  # episodes in the engine
+
+
+def scripted_task(config: dict[str, Any]) -> Files:
+    """The episodes of a task; see `eval.runs.tasks.tasks_of`."""
+    frame = play(config["environment"], config["policy"], config["options"], seeds_of(config))
+    return {"episodes.csv": frame.to_csv(index=False).encode()}
+
+
+def seeds_of(config: dict[str, Any]) -> range:
+    """Seeds of a task's episodes: the same for all tasks of an experiment with the same seed, none twice."""
+    first = config["first_seed"] + config["seed"] * config["episodes"]
+    return range(first, first + config["episodes"])
+
+
+def play(environment: str, policy: str, options: dict[str, Any], seeds: range) -> pd.DataFrame:
+    """One row per episode; columns as in `eval.rollout.run_episode`."""
+    arguments = setup_of(environment, options)
+    backend = arguments.pop("backend")
+    if backend == "highway-env":
+        env = make(environment, **arguments)
+        space = env.action_space
+        env.close()
+        episodes = [
+            run_episode(lambda: make(environment, **arguments), Scripted(policy, space, seed), seed) for seed in seeds
+        ]
+        return pd.DataFrame(episodes)
+
+    def batch(n: int) -> Any:
+        return make_vec(environment, n, autoreset_mode=AutoresetMode.DISABLED, **arguments)
+
+    env = batch(1)
+    space = env.single_action_space
+    env.close()
+    chunks = [seeds[i : i + SIDE_BY_SIDE] for i in range(0, len(seeds), SIDE_BY_SIDE)]
+    frames = []
+    for chunk in chunks:
+        # as many environments as episodes, so each plays the one of its own policy
+        each = [Scripted(policy, space, seed) for seed in chunk]
+        frames.append(evaluate(batch, partial(_act, each), chunk, n_envs=len(chunk), keep_actions=False))
+    return pd.concat(frames, ignore_index=True).drop(columns="actions")
+
+
+def _act(each: list[Scripted], observations: np.ndarray) -> np.ndarray:
+    return np.array([act() for act in each])

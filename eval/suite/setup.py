@@ -1,0 +1,92 @@
+"""Options of an experiment by their dotted names, as arguments of `rss_shield.make` and `make_vec`."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rss_shield.envs.arguments import rules_of
+from rss_shield.envs.configuration import check_config
+from rss_shield.envs.highway.drivers import RECKLESS
+from rss_shield.envs.highway.hostile import HOSTILE
+from rss_shield.envs.make_vec import BACKENDS
+from rss_shield.envs.options import MODES, Options
+from rss_shield.eval.runs.names import check_names, nested
+from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
+
+OTHERS = {"reckless": RECKLESS, **HOSTILE}  # who else is on the road, by name
+_SHIELD = (
+    *("entry", "intent", "waiting", "examine", "traffic", "risk"),
+    *("filter", "filter_at", "correction", "replace", "intervention_penalty", "penalty_on"),
+)
+_TABLE = ("preset", "ego", "other")
+KNOWN = ("shield", "backend", "others", "config", "rules", "judge", *_TABLE, *_SHIELD)
+DEFAULT_PRESET = "simulator"
+
+
+def setup_of(environment: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Keyword arguments of `rss_shield.make`, and `shield` and `backend`.
+
+    Args:
+      environment: its id.
+      options: dotted names -> values: shield (override, monitor), backend (fast, highway-env), preset,
+        ego.NAME and other.NAME (`RSSParams`), rules.NAME (`Rules`), judge.preset, judge.ego.NAME, judge.other.NAME,
+        judge.rules.NAME (one judge for all settings; on highway-env only), the other options of `ShieldWrapper` by
+        their names, others (stock, or who in `OTHERS`), config.NAME (of the environment).
+
+    Raises:
+      ValueError: an unknown name, with the nearest known one, or a value out of range.
+    """
+    given = nested(dict(options))
+    check_names(given, KNOWN, "options")
+    backend = given.get("backend", "fast")
+    for name, value, known in (
+        ("shield", given.get("shield", "override"), MODES),
+        ("backend", backend, BACKENDS),
+        ("others", given.get("others", "stock"), ("stock", *OTHERS)),
+    ):
+        if value not in known:
+            raise ValueError(f"{name} = {value!r}: expected one of {', '.join(known)}")
+    arguments: dict[str, Any] = {name: given[name] for name in _SHIELD if name in given}
+    table = _table(environment, given, "")
+    if table is not None:
+        arguments["params"] = table
+    if "rules" in given:
+        arguments["rules"] = _rules(given["rules"], "rules")
+    if "judge" in given:
+        judge = given["judge"]
+        check_names(judge, (*_TABLE, "rules"), "judge")
+        arguments["judge_params"] = _table(environment, judge, "judge.")
+        arguments["judge_rules"] = _rules(judge.get("rules", {}), "judge.rules")
+    Options.of(arguments)
+    config = dict(given.get("config", {}))
+    if given.get("others", "stock") != "stock":
+        config["other_vehicles_type"] = OTHERS[given["others"]]
+    if config:
+        check_config(environment, config)
+        arguments["config"] = config
+    return {"shield": given.get("shield", "override"), "backend": backend, **arguments}
+
+
+def _rules(given: Any, name: str) -> Rules:
+    check_names(given, Rules._fields, name)
+    return rules_of(given, name)
+
+
+def _table(environment: str, given: Mapping[str, Any], prefix: str) -> Preset | None:
+    """The preset with single parameters put in; None = the default of the environment."""
+    asked = {side: given.get(side, {}) for side in ("ego", "other")}
+    if "preset" not in given and not any(asked.values()) and not prefix:
+        return None
+    name = given.get("preset", "intersection" if "intersection" in environment else DEFAULT_PRESET)
+    if name not in PRESETS:
+        raise ValueError(f"{prefix}preset = {name!r}: expected one of {', '.join(PRESETS)}")
+    preset = PRESETS[name]
+    for side, values in asked.items():
+        check_names(values, RSSParams._fields, f"{prefix}{side}")
+        try:
+            params = RSSParams.validated(**{**getattr(preset, side)._asdict(), **values})
+        except ValueError as error:
+            raise ValueError(f"{prefix}{side}: {error}") from None
+        preset = preset._replace(**{side: params})  # type: ignore[arg-type]
+    if "response_time" in asked["ego"]:  # asked for, so never raised to one frame silently
+        preset = preset._replace(per_frame=False)
+    return preset

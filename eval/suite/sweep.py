@@ -1,0 +1,228 @@
+"""`rss-shield sweep EXPERIMENT`: run every task of an experiment that is not there yet, and write its points.
+
+    rss-shield sweep experiments/response-times.yaml
+    rss-shield sweep experiments/response-times.yaml --workers 2
+    rss-shield sweep experiments/presets.yaml --backend ray --address auto
+
+Results are in runs/NAME: tasks/KEY/ per task, points.csv, table.md, pareto.png and .pdf. Stop it whenever you like: the
+same command goes on. Results do not depend on backend and workers.
+"""
+
+import io
+import json
+import sys
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import pandas as pd
+import tyro
+
+from rss_shield.eval.files import to_json, write_json
+from rss_shield.eval.progress import progress_bar
+from rss_shield.eval.run_folder import versions
+from rss_shield.eval.runs.backends import Outcome, Work, run_tasks
+from rss_shield.eval.runs.experiment import Experiment, read_experiment
+from rss_shield.eval.runs.points import metric_named, point_row
+from rss_shield.eval.runs.store import Files, Store
+from rss_shield.eval.runs.tables import write_points
+from rss_shield.eval.runs.tasks import Task, samples_of, tasks_of
+from rss_shield.eval.suite.scripted import scripted_task
+from rss_shield.eval.suite.setup import setup_of
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """One option a field."""
+
+    experiment: Annotated[Path, tyro.conf.Positional]
+    """A YAML, TOML or JSON file; see docs/experiments.md."""
+    backend: Literal["local", "ray"] = "local"
+    """Processes of this machine, or a Ray cluster."""
+    workers: int = 1
+    """How many tasks at a time; on a running cluster (--address) as many as it has room for."""
+    address: str = ""
+    """Of a running Ray cluster; auto: the one this machine is part of; by default one is started here."""
+    runs_dir: Path = Path("runs")
+    """The results are below it, in a folder of the experiment's name."""
+
+
+def do_task(config: dict[str, Any]) -> Files:
+    """Any task, by its configuration."""
+    if "arm" not in config:
+        return scripted_task(config)
+    from rss_shield.eval.suite.trained import trained_task  # PyTorch takes its time
+
+    return trained_task(config)
+
+
+class Sweep:
+    """An experiment under way.
+
+    Args:
+      folder: of its results.
+      work: does a task.
+      run: backend, workers and address of `run_tasks`.
+    """
+
+    def __init__(self, experiment: Experiment, folder: Path, work: Work = do_task, **run: Any) -> None:
+        self.experiment, self.folder, self.work = experiment, folder, work
+        self.run_options = run
+        self.store = Store(folder / "tasks")
+        self.tasks: list[Task] = []  # all so far, in their order
+        self.failed: list[Outcome] = []
+
+    def run(self) -> None:
+        experiment = self.experiment
+        if experiment.drawn is None:
+            self.do(tasks_of(experiment))
+        elif experiment.by_optuna:
+            self._ask_optuna()
+        else:
+            self.do([task for sample in samples_of(experiment.drawn) for task in tasks_of(experiment, sample)])
+
+    def do(self, tasks: list[Task]) -> None:
+        """Run what is not there yet."""
+        check_tasks(tasks)
+        self.tasks += tasks
+        missing = list({task.key: task for task in tasks if not self.store.has(task)}.values())
+        with progress_bar(len(tasks), self.experiment.name, "task") as bar:
+            bar.update(len(tasks) - len(missing))
+            for outcome in run_tasks(missing, self.work, **self.run_options):
+                if outcome.files is None:
+                    self.failed.append(outcome)
+                else:
+                    self.store.put(outcome.task, outcome.files)
+                bar.update()
+
+    def _ask_optuna(self) -> None:
+        """Let Optuna's TPE choose, a batch at a time. Asked again, it chooses the same, so nothing is run twice."""
+        try:
+            import optuna
+        except ModuleNotFoundError:
+            raise ValueError("sweep.optuna needs the package optuna: pip install 'rss-shield[sweep]'") from None
+        drawn = self.experiment.drawn
+        assert drawn is not None
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
+        study = optuna.create_study(
+            directions=[optuna.study.StudyDirection[direction.upper()] for _, direction in drawn.objectives],
+            sampler=optuna.samplers.TPESampler(seed=drawn.seed),
+        )
+        for first in range(0, drawn.tasks, drawn.batch):
+            trials = [study.ask() for _ in range(min(drawn.batch, drawn.tasks - first))]
+            tasks = [
+                tasks_of(self.experiment, {n: _suggest(trial, n, s) for n, s in drawn.over.items()}) for trial in trials
+            ]
+            self.do([task for some in tasks for task in some])
+            for trial, some in zip(trials, tasks, strict=True):
+                if all(self.store.has(task) for task in some):
+                    study.tell(trial, self.objectives(some))
+                else:
+                    study.tell(trial, state=optuna.trial.TrialState.FAIL)
+
+    def objectives(self, tasks: list[Task]) -> list[float]:
+        """What Optuna is told: each metric's mean over the points."""
+        assert self.experiment.drawn is not None
+        points = self.points(tasks)
+        values = points.groupby("metric")["value"].mean()
+        return [float(values[metric]) for metric, _ in self.experiment.drawn.objectives]
+
+    def episodes(self, task: Task) -> pd.DataFrame:
+        return pd.read_csv(io.BytesIO((self.store.path(task) / "episodes.csv").read_bytes()), keep_default_na=False)
+
+    def points(self, tasks: Iterable[Task]) -> pd.DataFrame:
+        """Long: the rows of `point_row` of every point whose tasks are all there."""
+        points: dict[str, tuple[dict[str, Any], dict[int, Task]]] = {}
+        for task in tasks:
+            point = {
+                name: to_json(value) if isinstance(value, list | dict) else value for name, value in task.point.items()
+            }
+            points.setdefault(to_json(point), (point, {}))[1][task.config["seed"]] = task
+        rows = []
+        for point, seeds in points.values():
+            if not all(self.store.has(task) for task in seeds.values()):
+                continue
+            frames = {seed: self.episodes(task) for seed, task in seeds.items()}
+            if not self.experiment.arms:
+                rows += point_row(point, frames, pooled=True)
+                continue
+            for test in next(iter(frames.values()))["test"].unique():
+                tested = {seed: frame[frame["test"] == test] for seed, frame in frames.items()}
+                rows += point_row({**point, "test": test}, tested)
+        return pd.DataFrame(rows)
+
+
+def _suggest(trial: Any, name: str, space: Any) -> Any:
+    if hasattr(space, "low"):
+        return trial.suggest_float(name, space.low, space.high, log=space.log)
+    return trial.suggest_categorical(name, list(space))
+
+
+def check_tasks(tasks: list[Task]) -> None:
+    """Refuse bad options before anything runs."""
+    for task in {to_json({**task.config, "seed": 0}): task for task in tasks}.values():
+        if "arm" in task.config:
+            from rss_shield.eval.suite.trained import check_trained
+
+            check_trained(task.config)
+        else:
+            setup_of(task.config["environment"], task.config["options"])
+
+
+def sweep(experiment: Experiment, folder: Path, work: Work = do_task, **run: Any) -> Sweep:
+    """Run an experiment and write its points.
+
+    Args:
+      run: backend, workers and address of `run_tasks`.
+
+    Raises:
+      ValueError: options out of range; a metric that the episodes have not.
+    """
+    for name in (experiment.safety, experiment.performance):
+        metric_named(name)
+    folder.mkdir(parents=True, exist_ok=True)
+    for warning in _record(experiment, folder):
+        print(f"rss-shield sweep: warning: {warning}", file=sys.stderr)
+    under_way = Sweep(experiment, folder, work, **run)
+    under_way.run()
+    points = under_way.points(under_way.tasks)
+    if len(points):
+        axes = [name for name in points.columns if name not in ("metric", "value", "low", "high", "n", "over")]
+        title = f"{experiment.name}: {experiment.about}" if experiment.about else experiment.name
+        print(write_points(folder, points, axes, experiment.safety, experiment.performance, title))
+    return under_way
+
+
+def _record(experiment: Experiment, folder: Path) -> list[str]:
+    """Write the experiment and the versions beside its results; says what changed since the first task."""
+    path, now = folder / "experiment.json", json.loads(to_json(versions()))
+    before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"versions": now}
+    write_json(path, {"experiment": asdict(experiment), "versions": before["versions"]})
+    changed = [name for name in now if now[name] != before["versions"].get(name)]
+    return [
+        f"{name} is not what it was when the first task of {folder} ran: remove the folder to run all anew"
+        for name in changed
+    ]
+
+
+def run(arguments: list[str]) -> None:
+    """What a command line asks for."""
+    given = tyro.cli(Arguments, prog="rss-shield sweep", description=__doc__, args=arguments)
+    try:
+        experiment = read_experiment(given.experiment)
+        done = sweep(
+            experiment,
+            given.runs_dir / experiment.name,
+            backend=given.backend,
+            workers=given.workers,
+            address=given.address,
+        )
+    except (ValueError, OSError) as error:
+        print(f"rss-shield sweep: error: {' '.join(str(error).split())}", file=sys.stderr)
+        raise SystemExit(2) from None
+    print(f"\nEverything is in {done.folder}: table.md, points.csv, pareto.png, tasks/")
+    for outcome in done.failed:
+        print(f"task {outcome.task.key} {outcome.task.config} failed:\n{outcome.error}", file=sys.stderr)
+    if done.failed:
+        raise SystemExit(1)

@@ -1,0 +1,60 @@
+"""A task with training: one arm, one seed, one set of options, as `rss-shield train` does it."""
+
+import contextlib
+import io
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from rss_shield import train
+from rss_shield.eval.runs.store import Files
+
+_KEPT = ("learning_curve.csv", "removal_curve.csv", "model.zip", "card.json", "README.md")
+
+
+def trained_task(config: dict[str, Any]) -> Files:
+    """The test episodes of a task, its curves, its model, and all options of its run.
+
+    Raises:
+      ValueError: options that training refuses.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        arguments = [*arguments_of(config), "--runs-dir", folder, "--name", "run", "--workers", "1"]
+        _quietly(train.main, arguments)
+        run = Path(folder) / "run"
+        model = run / f"{config['arm']}-seed{config['seed']}"
+        paths = [run / "config.json", run / "episodes.csv", *(model / name for name in _KEPT)]
+        return {path.name: path.read_bytes() for path in paths if path.exists()}
+
+
+def check_trained(config: dict[str, Any]) -> None:
+    """Refuse what training would refuse, before anything runs."""
+    _quietly(train.started, arguments_of(config))
+
+
+def arguments_of(config: dict[str, Any]) -> list[str]:
+    """The command line of a task.
+
+    Raises:
+      ValueError: test seeds that training has not.
+    """
+    if config["first_seed"] != train.FIRST_TEST_SEED:
+        raise ValueError(
+            f"tests.first_seed = {config['first_seed']}: expected {train.FIRST_TEST_SEED} where arms train"
+        )
+    words = ["--env-id", config["environment"], "--arms", config["arm"], "--seeds", str(config["seed"])]
+    words += ["--eval-episodes", str(config["episodes"]), "--replay-episodes", "0"]
+    for name, value in config["options"].items():
+        values = value if isinstance(value, list | tuple) else [value]
+        words += [f"--{name.replace('_', '-')}", *map(str, values)]
+    return words
+
+
+def _quietly(call: Any, arguments: list[str]) -> None:
+    """Call without its print-outs; a refusal is a ValueError with what it says."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+            call(arguments)
+    except SystemExit:
+        raise ValueError(said.getvalue().strip().removeprefix("train.py: error: ")) from None

@@ -1,0 +1,141 @@
+"""The report: what it says is in its tables, it needs no network, and a browser shows it."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+from result_tables import episodes_of
+
+from rss_shield.eval.metrics import summarise
+from rss_shield.eval.paper.command import run, write
+from rss_shield.eval.paper.compared import as_texts, comparisons
+from rss_shield.eval.paper.render import escaped
+from rss_shield.eval.run_folder import versions
+
+BLAMES = {("off", "off"): ["ego"] * 12 + [""] * 8, ("off", "on"): ["other"] + [""] * 19, ("on", "on"): [""] * 20}
+
+
+def episodes() -> pd.DataFrame:
+    frames = []
+    for seed in range(3):
+        for (train, test), blames in BLAMES.items():
+            frame = episodes_of(blames, train, test).assign(train_seed=seed)
+            shift = seed + 5.0 * (train == "on")
+            frames.append(frame.assign(**{"return": frame["return"] + shift}))
+    return pd.concat(frames, ignore_index=True)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A run as `rss-shield train` leaves it, as far as a report reads it."""
+    path = tmp_path / "a-run"
+    path.mkdir()
+    config = {
+        "env_id": "highway-fast-v0",
+        "arms": ["unshielded", "shielded"],
+        "seeds": [0, 1, 2],
+        "total_timesteps": 1000,
+        "parameters": {},
+        "intervention_penalty": 0.0,
+    }
+    (path / "config.json").write_text(json.dumps({"config": config, **versions()}))
+    episodes().to_csv(path / "episodes.csv", index=False)
+    rng = np.random.default_rng(0)
+    for arm in config["arms"]:
+        for seed in config["seeds"]:
+            (path / f"{arm}-seed{seed}").mkdir()
+            started = np.arange(0, 1000, 20)
+            curve = {"timesteps": started + 20, "started": started, "cut": 0, "return": rng.normal(20, 2, 50)}
+            curve |= {"length": 20, "crashed": 0, "blame": "no contact", "override_share": 0.1, "cost": 0.0}
+            pd.DataFrame(curve).to_csv(path / f"{arm}-seed{seed}" / "learning_curve.csv", index=False)
+            rows = [
+                {"timesteps": t, "test": test, "n": 20, "crash": 0.5, "at_fault": 0.5, "return": 10.0, "return_sd": 2.0}
+                | {"intervention": 0.1, "change": 1.0}
+                for t in (500, 1000)
+                for test in ("off", "on")
+            ]
+            pd.DataFrame(rows).to_csv(path / f"{arm}-seed{seed}" / "removal_curve.csv", index=False)
+    return path
+
+
+def test_differences_are_paired_tested_and_corrected():
+    compared = comparisons(episodes()).set_index(["train", "test", "metric"])
+    crash = compared.loc["off", "on", "crash"]
+    # 12 of 20 against 1 of 20 that crashed in both: per seed 11 more in the first cell
+    assert crash["value"] == pytest.approx(-11 / 20) and crash["over"] == "seeds and episodes"
+    assert (crash["only_here"], crash["only_first"]) == (0, 33)
+    assert crash["p"] == pytest.approx(2 / 2**33)
+    # four tests, and this has the largest p: Holm multiplies it by 1, the smallest by 4
+    assert crash["p_holm"] == crash["p"]
+    assert compared.loc["off", "on", "at_fault"]["p_holm"] == pytest.approx(4 * 2 / 2**36)
+    assert compared.loc["on", "on", "return"]["value"] == pytest.approx(5.0)
+    assert np.isnan(compared.loc["on", "on", "return"]["p"])
+    assert "-55.0 [" in as_texts(comparisons(episodes()))["value [low, high]"][0]
+
+
+def test_who_learns_nothing_is_compared_with_every_seed():
+    frame = episodes()
+    scripted = episodes_of([""] * 20, "lazy", "on")
+    compared = comparisons(pd.concat([frame, scripted], ignore_index=True)).set_index(["train", "test", "metric"])
+    assert compared.loc["lazy", "on", "crash"]["only_first"] == 36
+
+
+def test_the_report_says_what_came_out_and_needs_no_network(folder, tmp_path):
+    page = write((folder,), tmp_path / "report", "A title & more").read_text()
+    assert "<h1>A title &amp; more</h1>" in page
+    assert "Tested with the shield off: 36 contacts in 60 episodes, 36 of them the ego&#x27;s fault (60 %" in page
+    assert "Tested with the shield on: 3 contacts in 120 episodes, 0 of them the ego&#x27;s fault" in page
+    summary = summarise(episodes()).set_index(["train", "test", "metric"])["value"]
+    best = summary.xs("return", level="metric").max()
+    assert f"Highest return: trained with the shield, tested with it on, {best:.1f} per episode." in page
+    assert not re.search(r"(src|href)=\"(?!data:|#)", page)
+    assert page.count("<img ") == page.count("data:image/png;base64,") == 4
+    markdown = (tmp_path / "report" / "report.md").read_text()
+    for link in re.findall(r"\]\((.*?)\)", markdown):
+        assert (tmp_path / "report" / link).exists() and (tmp_path / "report" / link).with_suffix(".pdf").exists()
+    latex = (tmp_path / "report" / "report.tex").read_text()
+    for name in re.findall(r"\\includegraphics\[.*?\]\{(.*?)\}", latex):
+        assert (tmp_path / "report" / name).exists()
+    assert latex.count(r"\begin{tabular}") == latex.count(r"\end{tabular}") == 4
+
+
+def test_roads_together_have_profiles(folder, tmp_path):
+    another = tmp_path / "another"
+    shutil.copytree(folder, another)
+    page = write((folder, another), tmp_path / "report", "Two").read_text()
+    assert "All roads together" in page and "interquartile mean" in page
+    assert (tmp_path / "report" / "figures" / "roads" / "profiles.pdf").exists()
+
+
+def test_what_is_no_run_is_refused_in_one_line(tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        run([str(tmp_path)])
+    assert stop.value.code == 2
+    assert "expected a finished run (config.json, episodes.csv) or sweep" in capsys.readouterr().err
+
+
+def test_latex_takes_every_sign():
+    assert escaped("50 % of a_b & c – ★ m/s²") == r"50 \% of a\_b \& c -- $\star$ m/s$^2$"
+
+
+BROWSER = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
+def test_a_browser_shows_the_page(folder, tmp_path):
+    page, picture = write((folder,), tmp_path / "report", "Seen"), tmp_path / "page.png"
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1200,5000"]
+    where = [f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={picture}", page.as_uri()]
+    subprocess.run([BROWSER, *options, *where], check=True, capture_output=True, timeout=120)
+    pixels = np.asarray(Image.open(picture).convert("RGB")).reshape(-1, 3)
+    seen = {tuple(colour) for colour in np.unique(pixels, axis=0)}
+    # the ego's blame, the shielded arm's curve: figures are drawn, not only named
+    assert {(0xD5, 0x5E, 0x00), (0x00, 0x72, 0xB2)} <= seen
+    assert 0.01 < (pixels.sum(axis=1) < 300).mean() < 0.5
