@@ -14,7 +14,7 @@ PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: paper help compare $(ENVS:%=compare-%) test test-fast bench evidence docs check clean
+.PHONY: help compare $(ENVS:%=compare-%) test test-fast bench evidence campaign paper docs check clean
 
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -50,6 +50,9 @@ paper: $(VENV)/installed-dev  ## run every experiment of the results pages and w
 	$(BIN)/python -m rss_shield.eval.pages $(ENVS:%=runs/%)
 	$(BIN)/rss-shield report $(ENVS:%=runs/%) $(SWEEPS:%=runs/%) --out runs/report
 	@date
+
+campaign: $(VENV)/installed  ## train every arm on two roads with many seeds, or go on with it (hours)
+	$(BIN)/python bench/campaign.py $(ARGS)
 
 docs: $(VENV)/installed-docs  ## build the site into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

@@ -22,7 +22,9 @@ LEARNERS = {
     "maskable-ppo": "rss_shield.agents.baselines.maskable_ppo",
     "sailr-ppo": "rss_shield.agents.baselines.sailr_ppo",
     "lagrangian-ppo": "rss_shield.agents.baselines.lagrangian_ppo",
+    "executed-ppo": "rss_shield.agents.baselines.executed_ppo",
     "dqn": "rss_shield.agents.baselines.dqn",
+    "executed-dqn": "rss_shield.agents.baselines.executed_dqn",
     "qr-dqn": "rss_shield.agents.baselines.qr_dqn",
     "sac": "rss_shield.agents.baselines.sac",
 }

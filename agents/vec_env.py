@@ -88,16 +88,19 @@ class VectorEnvAdapter(VecEnv):
         Returns:
           `[E]`; where an episode ended, of its last decision and not of the episode that began.
         """
+        if not self.ended.any():
+            return _under(self.last_infos, keys)
+        finals = _under(self.last_infos["final_info"], keys)
+        if self.ended.all():  # some keys are there only where a decision was made
+            return finals
         values = _under(self.last_infos, keys)
-        if not self.ended.any() or "final_info" not in self.last_infos:
-            return values
-        return np.where(self.ended, _under(self.last_infos["final_info"], keys), values)
+        return np.where(self.ended.reshape(-1, *[1] * (np.ndim(values) - 1)), finals, values)
 
     def close(self) -> None:
         self.env.close()
 
     def has_attr(self, attr_name: str) -> bool:
-        return hasattr(self.env, attr_name)
+        return attr_name == MASKS or hasattr(self.env, attr_name)  # whoever has no masks says so when asked
 
     def get_attr(self, attr_name, indices=None):
         return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
@@ -110,14 +113,20 @@ class VectorEnvAdapter(VecEnv):
 
         `action_masks()` is asked for once, and answers for all: its rows `[A]` are returned.
         """
-        method = getattr(self.env, method_name)
         if method_name == MASKS:
-            masks = method(*method_args, **method_kwargs)
+            masks = action_masks(self.env)
             return [masks[e] for e in self._get_indices(indices)]
+        method = getattr(self.env, method_name)
         return [method(e, *method_args, **method_kwargs) for e in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class, indices=None):
         return [False] * len(list(self._get_indices(indices)))
+
+
+def action_masks(env: Any) -> np.ndarray:
+    """`action_masks()` of all environments, `[E, A]`: of the engine at once, of others one after the other."""
+    together = getattr(env, MASKS, None)
+    return np.stack(env.call(MASKS)) if together is None else together()
 
 
 def _under(infos: Any, keys: tuple[str, ...]) -> Any:

@@ -30,7 +30,7 @@ from rss_shield.eval.runs.store import Store  # noqa: E402
 from rss_shield.eval.runs.tables import markdown_of, shown_metrics, texts, wide  # noqa: E402
 from rss_shield.eval.runs.tasks import tasks_of  # noqa: E402
 from rss_shield.eval.stats import bootstrap_mean, clopper_pearson  # noqa: E402
-from rss_shield.shield.lanes.judge import BOTH, EGO  # noqa: E402
+from rss_shield.shield.verdicts import BOTH, EGO  # noqa: E402
 
 PAGE = ROOT / "docs" / "results" / "ablation.md"
 HEADER = """# What each rule buys, and what it costs

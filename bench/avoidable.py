@@ -53,7 +53,7 @@ def play(env_id: str, driver: str, policy: str, seed: int, rules: Rules) -> dict
     )
     if info["blame"] in ("other", "inherited"):
         # the last copy is of the moment after the contact; how long after, the decision hides
-        row["braking"] = _is_avoided(copy.deepcopy(past[0]), len(past) - 1, -env.settings.ego.a_max_brake)
+        row["braking"] = _is_avoided(copy.deepcopy(past[0]), len(past) - 1, -env.settings.table.ego.a_max_brake)
         row["staying"] = _is_avoided(copy.deepcopy(past[0]), len(past) - 1, 0.0)
     return row
 

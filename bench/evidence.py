@@ -32,11 +32,11 @@ import rss_shield.envs.worlds.random_roads
 from rss_shield import make, make_vec
 from rss_shield.envs.highway.drivers import RECKLESS
 from rss_shield.eval.files import atomic
-from rss_shield.eval.metrics import AT_FAULT, BLAMES
 from rss_shield.eval.pages import fill, markdown, spaced, write_page
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.rollout import evaluate, run_episode
 from rss_shield.eval.stats import bootstrap_mean, wilson
+from rss_shield.shield.verdicts import AT_FAULT, BLAMES
 
 LANE_LEFT, IDLE, LANE_RIGHT, FASTER, SLOWER = range(5)
 AT_INTERSECTIONS = {SLOWER: 0, IDLE: 1, FASTER: 2}  # where nobody changes lanes

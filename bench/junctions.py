@@ -33,7 +33,6 @@ from rich.table import Table
 from rss_shield import make_vec
 from rss_shield.envs.roads.network import local_coordinates
 from rss_shield.eval.files import atomic
-from rss_shield.eval.metrics import AT_FAULT, BLAMES
 from rss_shield.eval.pages import markdown, write_page
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.rollout import evaluate
@@ -41,6 +40,7 @@ from rss_shield.eval.stats import Interval, bootstrap_mean, paired_difference, w
 from rss_shield.shield.junctions.controller import ENTRIES, block
 from rss_shield.shield.junctions.examined import EXAMINED
 from rss_shield.shield.junctions.plans import INTENTS, NEVER, THREAT, Track
+from rss_shield.shield.verdicts import AT_FAULT, BLAMES
 
 ENV_ID = "intersection-v0"
 FASTER, ACTIONS = 2, 3  # SLOWER, IDLE, FASTER

@@ -31,12 +31,12 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.idm_ego import make_idm
 from rss_shield.envs.options import Settings
 from rss_shield.eval.files import write_text
-from rss_shield.eval.metrics import AT_FAULT
 from rss_shield.eval.rollout import evaluate, run_episode
 from rss_shield.eval.stats import paired_difference
-from rss_shield.shield.definitions.kinematics import frames_for
 from rss_shield.shield.lanes.pair import assess
 from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.table import table_for
+from rss_shield.shield.verdicts import AT_FAULT
 
 ROADS = (
     *("highway-fast-v0", "highway-v0", "merge-v0", "merge-v1", "exit-v0", "two-way-v0", "u-turn-v0"),
@@ -199,41 +199,89 @@ def of_road(env_id: str, config: Config) -> str:
 # ---------------------------------------------------------------- between two lanes
 
 
-def longest_off_centre(logs: list[Any], dt: float) -> np.ndarray:
-    """Longest stretch of each episode more than 1 m off the centre of a lane [s], on a road with lanes every 4 m."""
-    longest = []
-    for log in logs:
-        y = log.cars[:, 0]["y"]
-        off = np.abs((y + 2.0) % 4.0 - 2.0) > 1.0
-        run = best = 0
-        for is_off in off:
-            run = run + 1 if is_off else 0
-            best = max(best, run)
-        longest.append(best * dt)
-    return np.array(longest)
+LONG = 1.2  # a stretch between two lanes [s] that asks for an explanation
+
+
+def off_centre(y: np.ndarray) -> np.ndarray:
+    """Is the ego more than 1 m off the centre of every lane, on a road with lanes every 4 m? `[T]` positions."""
+    return np.abs((y + 2.0) % 4.0 - 2.0) > 1.0
+
+
+def longest(off: np.ndarray) -> slice:
+    """The longest stretch of frames that are `off` `[T]`."""
+    best, start = slice(0, 0), 0
+    for t, is_off in enumerate(off):
+        if not is_off:
+            start = t + 1
+        elif t + 1 - start > best.stop - best.start:
+            best = slice(start, t + 1)
+    return best
+
+
+def frames_free(seed: int, actions: np.ndarray, rules: Rules) -> tuple[int, int]:
+    """The longest stretch of an episode between two lanes, played again on highway-env.
+
+    Args:
+      seed: of the episode.
+      actions: `[30]` meta-actions.
+
+    Returns:
+      (frames, free): its frames, and those of them on which the shield let the ego move sideways as fast as it asked.
+    """
+    env = make("highway-fast-v0", rules=rules)
+    env.reset(seed=seed)
+    ego: Any = env._ego  # type: ignore[attr-defined]
+    places, held, inner = [], [], ego._frame
+
+    def watched() -> None:
+        wish = ego.vehicle.action["steering"]
+        inner()
+        places.append(ego.vehicle.position[1])
+        # a steering angle nearer to zero or beyond it turns the car less toward where it is asked to go
+        held.append(abs(ego.vehicle.action["steering"] - wish) > 1e-9)
+
+    ego._frame = watched
+    for action in actions:
+        _, _, terminated, truncated, _ = env.step(int(action))
+        if terminated or truncated:
+            break
+    stretch = longest(off_centre(np.array(places)))
+    return stretch.stop - stretch.start, int((~np.array(held)[stretch]).sum())
 
 
 def between_lanes(config: Config) -> str:
-    rows: list[Any] = [("actions", "shield", "n", "longest [s]", "episodes above 1.2 s", "mean of the longest [s]")]
+    rows: list[Any] = [
+        ("actions", "shield", "n", "longest [s]", f"above {LONG} s", "longest, free to move faster [s]", "mean [s]")
+    ]
+    n, dt = config.lane_changes, 0.2
     for driver in ("lanes", "random"):
         for name, mode, rules in (
             ("none", "monitor", Rules()),
             (BEFORE, "override", RULES[BEFORE]),
             (AFTER, "override", Rules()),
         ):
-            env = make_vec("highway-fast-v0", config.lane_changes, mode, rules=rules, threads=config.threads)
-            rng, n = np.random.default_rng(1), config.lane_changes
+            env = make_vec("highway-fast-v0", n, mode, rules=rules, threads=config.threads)
+            rng, taken = np.random.default_rng(1), []
             env.reset(seed=FIRST_SEED)
             env.recording.choose(range(n))  # type: ignore[attr-defined]
             for _ in range(30):
-                env.step(act(driver, rng, n, 5))
+                taken.append(act(driver, rng, n, 5))
+                env.step(taken[-1])
             finished = {log.env: log for log in reversed(env.recording.finished)}  # type: ignore[attr-defined]
-            off = longest_off_centre(list(finished.values()), 0.2)
             env.close()
-            rows.append(
-                (driver, name, len(off), f"{off.max():.1f}", int((off > 1.2 + 1e-9).sum()), f"{off.mean():.2f}")
-            )
-    text = "Longest stretch more than 1 m off the centre of every lane, highway-fast-v0 (frames of 0.2 s)."
+            stretches = {e: longest(off_centre(log.cars[:, 0]["y"])) for e, log in finished.items()}
+            seconds = {e: dt * (stretch.stop - stretch.start) for e, stretch in stretches.items()}
+            long = [e for e, length in seconds.items() if length > LONG + 1e-9]
+            free = "-"
+            if mode == "override":
+                again = [frames_free(FIRST_SEED + e, np.array(taken)[:, e], rules) for e in long]
+                free = f"{max((dt * frames for _, frames in again), default=0.0):.1f}"
+            lengths = list(seconds.values())
+            rows.append((driver, name, n, f"{max(lengths):.1f}", len(long), free, f"{np.mean(lengths):.2f}"))
+    text = f"""Longest stretch more than 1 m off the centre of every lane, highway-fast-v0 (frames of {dt} s). A lane
+change crosses 2 m there, and the published limits of lateral speed and heading (C1y, `heading_bound`) let a car at
+15 m/s do so in 1.3 s at best. Episodes above {LONG} s are therefore played again on highway-env, and in their longest
+stretches those frames are counted on which the shield did *not* hold the steering to such a limit."""
     return f"## Between two lanes\n\n{text}\n\n{markdown(rows)}"
 
 
@@ -307,16 +355,15 @@ def behind_a_leader(kind: str, dt: float = 1 / 15, seconds: float = 40.0) -> pd.
     leader = Vehicle(road, [70.0, 0.0], speed=22.0)
     road.vehicles += [ego, leader]
     preset, rules = PRESETS["simulator"], RULES.get(kind, Rules())
-    table = preset.ego._replace(response_time=float(frames_for(max(preset.ego.response_time, dt), dt) * dt))
-    other = preset.other._replace(response_time=float(frames_for(preset.other.response_time, dt) * dt))
-    shield = ShieldedEgo(ego, Settings(table, other, rules, kind != "IDM", dt), record=True)
+    table = table_for(preset, rules, dt)
+    shield = ShieldedEgo(ego, Settings(table, kind != "IDM"), record=True)
     for k in range(int(seconds / dt)):
         t = k * dt
         leader.action["acceleration"] = -3.0 if 10.0 <= t < 14.0 else 1.0 if 20.0 <= t < 32.0 else 0.0
         road.act()
         road.step(dt)
     frames = shield.record or []
-    pairs = [assess(frame.ego, frame.users[0], table, other, rules, dt) for frame in frames]
+    pairs = [assess(frame.ego, frame.users[0], table) for frame in frames]
     speeds = np.array([frame.poses[-1, 3] for frame in frames])
     return pd.DataFrame(
         {

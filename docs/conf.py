@@ -7,6 +7,7 @@ from pathlib import Path
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
+REPLAYS = DOCS / "_build" / "replays"  # pages of their own, which the site shows
 SOURCES = DOCS / "_build" / "sources"  # the package without the links in it, which are not followed
 
 
@@ -18,6 +19,25 @@ def stage() -> None:
 
 stage()
 
+
+def record() -> None:
+    """Play the episodes that the site shows, and write the pages on which they play."""
+    from rss_shield import make
+    from rss_shield.envs.highway.recorder import record_trace
+    from rss_shield.eval.viewer.page import write_replay_page
+
+    shutil.rmtree(REPLAYS, ignore_errors=True)
+    REPLAYS.mkdir(parents=True)
+    for name, env_id, faster in (("motorway", "highway-fast-v0", 3), ("junction", "intersection-v0", 2)):
+        traces = [
+            record_trace(make(env_id, shield), lambda _, action=faster: action, seed=0)
+            for shield in ("monitor", "override")
+        ]
+        write_replay_page(traces, REPLAYS / f"replay-{name}.html")
+
+
+record()
+
 # ---------------------------------------------------------------- project
 
 _project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -28,6 +48,7 @@ copyright = author
 extensions = ["myst_parser", "sphinx.ext.napoleon", "autoapi.extension", "sphinx_copybutton"]
 exclude_patterns = ["_build", "README.md"]
 html_theme = "furo"
+html_extra_path = [str(REPLAYS)]
 html_title = f"{project} {release}"
 
 # ---------------------------------------------------------------- pages

@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from gymnasium.wrappers import RecordEpisodeStatistics
 from highway_env.envs.common.action import DiscreteMetaAction
+from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.arguments import rules_of, seed_of, whole
 from rss_shield.envs.fast.config import Unsupported, compile_scenario
@@ -21,9 +22,11 @@ from rss_shield.envs.options import (
     Settings,
     check_environment,
     check_replace,
+    check_risk,
     settings_for,
     split,
 )
+from rss_shield.shield.risk import RiskSettings
 
 BACKENDS = ("fast", "highway-env")
 
@@ -54,8 +57,8 @@ def make_vec(
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
       kwargs: `max_episode_steps`; `rules`, `intervention_penalty`, `penalty_on`, `entry`, `intent`, `waiting`,
-        `examine`, `filter`, `filter_at`, `correction` and `replace` of `ShieldWrapper`; and whatever else `make`
-        takes (`judge_params`, ...) where the backend is "highway-env".
+        `examine`, `filter`, `filter_at`, `correction`, `replace` and `risk` of `ShieldWrapper`; and whatever else
+        `make` takes (`judge_params`, ...) where the backend is "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.
@@ -80,8 +83,8 @@ def make_vec(
     scenario = compile_scenario(env_id, config, max_episode_steps=rest.get("max_episode_steps"))
     settings = _settings_in(scenario.stock, shield, options) if shield is not None else None
     penalty, by_change = float(options.intervention_penalty), options.penalty_on == "change"
-    replaces = shield is not None and options.replace == "decision"
-    return FastVectorEnv(scenario, num_envs, settings, penalty, autoreset_mode, threads, by_change, replaces)
+    replaces, risk = shield is not None and options.replace == "decision", _risk_in(shield, options)
+    return FastVectorEnv(scenario, num_envs, settings, penalty, autoreset_mode, threads, by_change, replaces, risk)
 
 
 def _check_supported(options: Options, rest: dict[str, Any]) -> None:
@@ -103,9 +106,19 @@ def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
     return settings
 
 
+def _risk_in(shield: str | None, options: Options) -> RiskSettings | None:
+    """What risk is measured by; compiled code cannot say that somebody is too fast for it."""
+    risk = check_risk(options.risk)
+    if risk is not None and shield is None:
+        raise ValueError(f"risk = {options.risk!r}: expected False without a shield; use shield = 'monitor'")
+    if risk is not None and not risk.wave_speed > Vehicle.MAX_SPEED:
+        raise ValueError(f"risk: wave_speed = {risk.wave_speed:g}: expected > {Vehicle.MAX_SPEED:g} m/s in the engine")
+    return risk
+
+
 # options that the engine has no answer to, and what says that nobody asks
 _OF_HIGHWAY_ENV = {
-    **{"traffic": "stock", "record": False, "risk": False, "measures": False},
+    **{"traffic": "stock", "record": False, "measures": False},
     **{"judge_params": None, "judge_rules": None},
 }
 _OF_GYMNASIUM = {  # arguments of its `make_vec` that mean something else here

@@ -17,18 +17,19 @@ from highway_env.envs.u_turn_env import UTurnEnv
 from rss_shield.envs.arguments import number, preset_of, rules_of
 from rss_shield.envs.stock import LOWEST_FREQUENCY, check_frequencies
 from rss_shield.envs.worlds.signalised import SignalisedIntersectionEnv
-from rss_shield.shield.definitions.kinematics import frames_for
 from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
 from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
 from rss_shield.shield.junctions.plans import ANY, INTENTS
 from rss_shield.shield.lanes.correction import CORRECTIONS, NEAREST
-from rss_shield.shield.params import Preset, RSSParams, Rules
+from rss_shield.shield.params import Preset, RSSParams, Rules, Table
 from rss_shield.shield.risk import RiskSettings
+from rss_shield.shield.table import table_for
 
 LANES, PLANS = range(2)  # distances along the lane (Defs. 1-10), or plans through junctions (Defs. 14-18)
 MODES = ("override", "monitor")
 WAITING = ("line", "anywhere")
+CAR_MASS = 1500.0  # of everybody [kg]: highway-env's vehicles have none
 TRAFFIC = ("stock", "compliant")  # how everybody else drives
 PENALTIES = ("response", "change")  # what an intervention penalty is charged for
 REPLACES = ("frame", "decision")  # what an action that is not permitted is replaced on
@@ -45,13 +46,10 @@ _SCHEMES = {
 
 
 class Settings(NamedTuple):
-    """What a shield runs with, response times in whole frames."""
+    """What a shield runs with."""
 
-    ego: RSSParams
-    other: RSSParams
-    rules: Rules
+    table: Table
     overrides: bool  # False: watch only
-    dt: float  # length of a simulation frame [s]
     scheme: int = LANES  # what keeps the ego safe: LANES or PLANS
     entry: int = CAUTIOUS  # whom the ego expects to give way: index into `shield.junctions.controller.ENTRIES`
     intent: int = ANY  # which routes it expects of others: index into `shield.junctions.plans.INTENTS`
@@ -180,6 +178,19 @@ class Options:
         return preset, rules_of(self.rules) if self.judge_rules is None else rules_of(self.judge_rules, "judge_rules")
 
 
+def check_risk(risk: Any) -> RiskSettings | None:
+    """Settings of the measure of risk, or None if it is off.
+
+    Raises:
+      ValueError: neither a truth value nor settings in their ranges.
+    """
+    if isinstance(risk, RiskSettings):
+        return RiskSettings.validated(**risk._asdict())
+    if not isinstance(risk, bool):
+        raise ValueError(f"risk = {risk!r}: expected True, False or RiskSettings")
+    return RiskSettings() if risk else None
+
+
 def split(arguments: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """What is an option of the shield, and the rest."""
     names = {option.name for option in fields(Options)}
@@ -259,13 +270,6 @@ def default_preset(env: Any) -> str:
 def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dict[str, Any]) -> Settings:
     """What a shield on `env` runs with: response times rounded up to whole frames (condition C2)."""
     dt = 1 / env.config["simulation_frequency"]
-    rho = params.ego.response_time
-    if rho < dt - 1e-9 and not params.per_frame:
-        raise ValueError(
-            f"response_time = {rho:g} s of the ego is shorter than one simulation frame; expected >= {dt:g} s"
-        )
-    ego = params.ego._replace(response_time=float(frames_for(max(rho, dt), dt) * dt))
-    other = params.other._replace(response_time=float(frames_for(params.other.response_time, dt) * dt))
     scheme = scheme_of(env)
     if scheme == PLANS and dt > 1 / LOWEST_FREQUENCY + 1e-9:
         raise ValueError(
@@ -275,11 +279,9 @@ def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dic
     if scheme == PLANS:  # the paths hold everybody's width at any speed, so lateral speeds need no limit
         rules = rules._replace(limits=False)
     _check_distances(scheme, conduct)
-    if (
-        conduct["filter"].kind != RSS
-    ):  # nothing that is the shield's own acts beside it, and nothing else depends on these
+    if conduct["filter"].kind != RSS:  # nothing that is the shield's own acts beside another filter
         rules = rules._replace(take_back=False, anticipation=0.0)
-    return Settings(ego, other, rules, mode == "override", dt, scheme, **conduct)
+    return Settings(table_for(params, rules, dt), mode == "override", scheme, **conduct)
 
 
 def _check_distances(scheme: int, conduct: dict[str, Any]) -> None:

@@ -13,6 +13,8 @@ OFF, ON = "off", "on"
 # what the shield does in a test: options of `rss_shield.make_vec`. A monitor assigns blame and changes nothing.
 UNSHIELDED: Mapping[str, Any] = {"shield": "monitor"}
 SHIELDED: Mapping[str, Any] = {"shield": "override"}
+BEFORE: Mapping[str, Any] = {**SHIELDED, "replace": "decision"}  # replaces actions before a decision, too
+IN_FULL: Mapping[str, Any] = {**SHIELDED, "correction": "response"}  # replaces commands by the proper response
 OFF_AND_ON: Mapping[str, Mapping[str, Any]] = {OFF: UNSHIELDED, ON: SHIELDED}
 SCRIPTED = "scripted"
 # settings that the command line gives: name of the setting -> of its option
@@ -63,6 +65,17 @@ def paying(penalty: float = 0.0, penalty_on: str = "response") -> Mapping[str, A
     return {**SHIELDED, "intervention_penalty": penalty, "penalty_on": penalty_on}
 
 
+def own(shield: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
+    """Tests without a shield, and with the variant of ours that the agent was trained behind."""
+    return {OFF: UNSHIELDED, ON: shield}
+
+
+def rival(name: str, label: str, colour: str) -> Arm:
+    """PPO behind another filter, tested also behind that one."""
+    shield = {**SHIELDED, "filter": name}
+    return Arm(name, f"PPO behind {label}", colour, "ppo", shield, tests={**OFF_AND_ON, name: shield})
+
+
 # Okabe & Ito's colours first, then Tol's; the penalties are two ramps
 _BLUES = ("#9ECAE1", "#6BAED6", "#4292C6", "#2171B5", "#084594")
 _GREENS = ("#A1D99B", "#74C476", "#41AB5D", "#006D2C")
@@ -86,14 +99,33 @@ ROWS = (
     ),
     Arm("adaptive-penalty", _BY_WANTED + "change of acceleration", "#009E73", "adaptive-ppo", paying(), WANTED_CHANGE),
     Arm("adaptive-share", _BY_WANTED + "share of frames", "#56B4E9", "adaptive-ppo", paying(), WANTED_SHARE),
+    Arm("maskable", "MaskablePPO, the shield behind the masks", "#D6B4FC", "maskable-ppo", SHIELDED, masked=True),
+    Arm("proactive", "PPO, actions replaced before a decision", "#A6761D", "ppo", BEFORE, tests=own(BEFORE)),
+    Arm(
+        "executed-action", "PPO, replaced and learnt as executed", "#7570B3", "executed-ppo", BEFORE, tests=own(BEFORE)
+    ),
     Arm("sailr", "PPO, an intervention ends the episode", "#CC79A7", "sailr-ppo", paying()),
     Arm("ppo-lagrangian", "PPO-Lagrangian without a shield", "#882255", "lagrangian-ppo", settings=WANTED_COST),
     Arm("dqn", "DQN without a shield", "#AA4499", "dqn"),
     Arm("dqn-shielded", "DQN behind the shield", "#332288", "dqn", SHIELDED),
+    Arm(
+        "executed-action-dqn",
+        "DQN, replaced and learnt as executed",
+        "#1B9E77",
+        "executed-dqn",
+        BEFORE,
+        tests=own(BEFORE),
+    ),
     Arm("qr-dqn", "QR-DQN without a shield", "#DDCC77", "qr-dqn"),
     Arm("qr-dqn-shielded", "QR-DQN behind the shield", "#117733", "qr-dqn", SHIELDED),
     Arm("sac", "SAC without a shield", "#CC6677", "sac", config=CONTINUOUS),
-    Arm("sac-shielded", "SAC behind the shield", "#44AA99", "sac", SHIELDED, config=CONTINUOUS),
+    Arm("sac-replaced", "SAC, commands replaced", "#44AA99", "sac", IN_FULL, tests=own(IN_FULL), config=CONTINUOUS),
+    Arm("sac-projected", "SAC, commands corrected as little as may be", "#999933", "sac", SHIELDED, config=CONTINUOUS),
+    rival("ttc", "a limit of the time to collision", "#661100"),
+    rival("distance-45m", "a distance of 45 m", "#6699CC"),
+    rival("cbf", "a control barrier function", "#888888"),
+    rival("limits", "the always-on limits alone", "#AA4466"),
+    rival("literal-def10", "Def. 10 as printed, once per decision", "#4477AA"),
 )
 ARMS = {arm.name: arm for arm in ROWS}
 

@@ -11,9 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rss_shield.eval.stats import Interval, bootstrap_mean, bootstrap_median, paired_difference, student, wilson
-
-BLAMES = ("ego", "both", "other", "inherited", "none")
-AT_FAULT = ("ego", "both")
+from rss_shield.shield.verdicts import AT_FAULT, BLAMES
 
 
 class Metric(NamedTuple):
@@ -51,13 +49,21 @@ METRICS = (
     Metric("near_misses", "near misses", "", "mean", 1, 2, (0, math.inf)),
     Metric("impact", "impact speed", "m/s", "mean", 1, 1, (0, math.inf)),
     Metric("impact_delta_v", "DeltaV", "m/s", "mean", 1, 1, (0, math.inf)),
-    Metric("min_thw", "min THW", "s", "median", 1, 1, (0, math.inf)),
-    Metric("max_drac", "max DRAC", "m/s²", "median", 1, 1, (0, math.inf)),
+    Metric("min_thw_ahead", "min THW ahead", "s", "median", 1, 1, (0, math.inf)),
+    Metric("max_drac_ahead", "max DRAC ahead", "m/s²", "median", 1, 1, (0, math.inf)),
     Metric("min_pet", "min PET", "s", "median", 1, 1, (0, math.inf)),
     Metric("violation_ego", "RSS violated by ego", "s", "mean", 1, 2, (0, math.inf)),
     Metric("violation_other", "RSS violated by other", "s", "mean", 1, 2, (0, math.inf)),
     Metric("shield_time", "shield per frame", "µs", "median", 1e6, 0, (0, math.inf)),
     Metric("min_ttc", "min TTC", "s", "median", 1, 1, (0, math.inf)),
+    # where risk is measured
+    Metric("min_thw", "min THW", "s", "median", 1, 1, (0, math.inf)),
+    Metric("max_drac", "max DRAC", "m/s²", "median", 1, 1, (0, math.inf)),
+    Metric("max_rdsi", "max RDSI", "", "median", 1, 2),
+    Metric("time_known_safe", "known safe", "s", "mean", 1, 1, (0, math.inf)),
+    Metric("time_unknown", "unknown", "s", "mean", 1, 1, (0, math.inf)),
+    Metric("time_known_unsafe", "known unsafe", "s", "mean", 1, 1, (0, math.inf)),
+    Metric("band_risk", "band risk", "s", "mean", 1, 1, (0, math.inf)),
 )
 
 

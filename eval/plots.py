@@ -13,8 +13,8 @@ from matplotlib.ticker import PercentFormatter
 
 from rss_shield.eval.arms import ARMS
 from rss_shield.eval.files import atomic
-from rss_shield.eval.metrics import AT_FAULT, BLAMES
 from rss_shield.eval.stats import Interval, completion_weights, weighted_mean, weighted_rate, wilson
+from rss_shield.shield.verdicts import AT_FAULT, BLAMES
 
 # Okabe & Ito's colours, told apart with every common colour blindness
 BLAME_COLOURS = {

@@ -16,6 +16,12 @@ RIDE = (
     *("p99_acceleration", "p99_jerk", "p99_lateral_acceleration", "p99_lateral_jerk", "p99_yaw_acceleration"),
     *("comfortable_share", "hard_braking_share", "hard_brakings_per_km", "min_time_gap", "mean_time_gap"),
 )
+# of the driving safety field and beside it, where it is measured
+RISK = (
+    *("max_rdsi", "max_total_rdsi", "time_known_safe", "time_unknown", "time_known_unsafe"),
+    *("band_risk", "min_thw", "max_drac"),
+)
+MOST_DRAC = 100.0  # braking beyond says nothing more, and is infinite at a contact [m/s^2]
 MakeEnv = Callable[[], Any]  # builds a gymnasium environment whose info has the shield's keys
 Policy = Callable[[Any], Any]  # observation -> action
 
@@ -60,7 +66,7 @@ def evaluate(
     try:
         observations, _ = env.reset(seed=[int(seed) for seed in seeds[:envs]])
         while len(records) < len(seeds):
-            chosen = policy(observations, env.action_masks()) if masked else policy(observations)
+            chosen = policy(observations, _masks(env)) if masked else policy(observations)
             observations, rewards, terminated, truncated, infos = env.step(chosen)
             returns += rewards
             speeds += infos["speed"]
@@ -85,6 +91,11 @@ def evaluate(
     return pd.DataFrame([records[i] for i in range(len(seeds))])
 
 
+def _masks(env: Any) -> np.ndarray:
+    """`action_masks()` of all environments, `[E, A]`: of the engine at once, of others one after the other."""
+    return env.action_masks() if hasattr(env, "action_masks") else np.stack(env.call("action_masks"))
+
+
 def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
     """Play one episode in an environment of its own and return its record.
 
@@ -94,9 +105,9 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
     reached its goal untouched (no such column where there is no goal); cost: sum; override_share: of
     the simulation frames; dangerous_pairs, broken_duties: pair-frames in danger, and those on which the
     car broke its duty; min_ttc: smallest time to collision [s]; what was changed and how the ride felt: the keys
-    `RIDE`, as `envs.ShieldWrapper` documents them; with the option `measures` what it adds, and frozen: the time was up
-    and the ego had stood for 5 s or more with nobody within 20 m; evidence: the verdict's grounds as JSON, {} without
-    contact.
+    `RIDE`, and with the option `risk` the keys `RISK`, as `envs.ShieldWrapper` documents them (max_drac at most
+    `MOST_DRAC`); with the option `measures` what it adds, and frozen: the time was up and the ego had stood for 5 s or
+    more with nobody within 20 m; evidence: the verdict's grounds as JSON, {} without contact.
     """
     env = make_env()
     try:
@@ -147,8 +158,13 @@ def _record(seed: int, total_reward: float, total_speed: float, length: int, inf
         "min_ttc": float(info["min_ttc"]),
         **{name: float(info[name]) for name in RIDE if name in info},
         **{name: float(value) for name, value in info.get("measures", {}).items()},
+        **{name: _risk(name, info[name]) for name in RISK if name in info},
         "evidence": json.dumps(info["blame_evidence"] if blame else {}, default=_plain),
     }
+
+
+def _risk(name: str, value: Any) -> float:
+    return min(float(value), MOST_DRAC) if name == "max_drac" else float(value)
 
 
 def _info(infos: dict[str, Any], e: int) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """An algorithm of your own in one file, on many environments in the compiled engine: PPO in PyTorch, and its speed.
 
-python examples/own_algorithm.py 500000 makes so many decisions; without a number, too few to learn from. `make_vec` is a
-`gymnasium.vector.VectorEnv`: whatever reads one will do. `info["cost"]` is for constrained problems.
+python examples/own_algorithm.py 500000 makes so many decisions; without a number, too few to learn from. `make_vec`
+returns a `gymnasium.vector.VectorEnv`: whatever reads one will do. `info["cost"]` is for constrained problems.
 """
 
 import sys
@@ -32,15 +32,14 @@ for update in range(updates):
     cost = 0.0
     with torch.no_grad():
         for t in range(STEPS):
-            out = net(seen[t])
-            values[t], logs = out[:, -1], out[:, :-1].log_softmax(1)
+            values[t], logs = (out := net(seen[t]))[:, -1], out[:, :-1].log_softmax(1)
             chosen[t] = torch.multinomial(logs.exp(), 1)[:, 0]
             old[t] = logs.gather(1, chosen[t][:, None])[:, 0]
             observations, reward, terminated, truncated, infos = envs.step(chosen[t].numpy())
             seen[t + 1], rewards[t] = torch.as_tensor(observations).flatten(1), torch.as_tensor(reward)
             going[t], cost = torch.as_tensor(~(terminated | truncated)), cost + float(infos["cost"].sum())
         values[-1] = net(seen[-1])[:, -1]
-        gains, later = torch.zeros(STEPS, ENVS), torch.zeros(ENVS)
+        gains, later = torch.zeros(STEPS, ENVS), 0.0
         for t in reversed(range(STEPS)):
             error = rewards[t] + DISCOUNT * going[t] * values[t + 1] - values[t]
             later = gains[t] = error + DISCOUNT * TRACE * going[t] * later

@@ -7,15 +7,15 @@ A car at full throttle comes up behind a slower one, which brakes hard after fou
 
 import numpy as np
 
-from rss_shield.shield import PRESETS, Rules
+from rss_shield.shield import PRESETS, Rules, table_for
 from rss_shield.shield.command import Command
 from rss_shield.shield.lanes.controller import Body, find_danger, respond
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
 
 DT, SECONDS = 0.1, 12.0
-me, other = PRESETS["slides"].ego, PRESETS["slides"].other  # response times are whole frames: 1 s and 2 s
-rules, body = Rules(), Body(half_wheelbase=1.25, max_slip=0.5, curvature=0.0)
+table = table_for(PRESETS["slides"], Rules(), DT)
+body = Body(half_wheelbase=1.25, max_slip=0.5, curvature=0.0)
 
 
 def car(s: float, speed: float) -> np.ndarray:
@@ -37,11 +37,13 @@ def drive(shielded: bool) -> str:
         if smallest <= 0.0:
             return f"they touch after {frame * DT:.1f} s at {ego['speed']:.0f} m/s"
         users = np.array([leader])
-        danger = find_danger(ego, users, ego_before, leader_before, memory, me, other, rules, DT)
-        response = respond(Command(me.a_max_accel, 0.0), danger, ego, body, rules, DT)  # full throttle, if permitted
+        danger = find_danger(ego, users, ego_before, leader_before, memory, table)
+        response = respond(
+            Command(table.ego.a_max_accel, 0.0), danger, ego, body, table.rules, DT
+        )  # full throttle, if permitted
         ego_before, leader_before = ego.copy(), users
         braking = -8.0 if frame * DT > 4.0 else 0.0
-        for user, a in ((ego, response.command.acceleration if shielded else me.a_max_accel), (leader, braking)):
+        for user, a in ((ego, response.command.acceleration if shielded else table.ego.a_max_accel), (leader, braking)):
             user["s"] += user["speed"] * DT
             user["along"] = user["speed"]
             user["speed"] = max(user["speed"] + a * DT, 0.0)

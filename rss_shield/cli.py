@@ -8,8 +8,11 @@ from rss_shield.eval.interrupt import stop_on_interrupt
 COMMANDS = {
     "train": ("rss_shield.train", "train", "train with and without the shield, test, compare"),
     "test": ("rss_shield.test", "train", "test a model or a policy with the shield and without"),
-    "report": ("rss_shield.eval.paper.command", "train", "one page of what came out of runs and sweeps"),
+    "record": ("rss_shield.eval.suite.record", "train", "play one episode and write down everything"),
+    "judge": ("rss_shield.eval.suite.judge.command", "train", "who was to blame in any log"),
+    "replay": ("rss_shield.eval.viewer.command", "train", "a page on which recorded episodes play"),
     "sweep": ("rss_shield.eval.suite.sweep", "train", "run every task of an experiment file, here or on a cluster"),
+    "report": ("rss_shield.eval.paper.command", "train", "one page of what came out of runs and sweeps"),
 }
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"
 
@@ -25,7 +28,8 @@ def main(argv: list[str] | None = None) -> None:
         sys.exit(f"rss-shield: unknown command {name!r}; expected one of {', '.join(COMMANDS)}")
     module, extra, _ = COMMANDS[name]
     # before all that takes its time
-    stop_on_interrupt(f"rss-shield {name}: stopping; nothing that is finished is lost, --resume goes on")
+    resumes = "; nothing that is finished is lost, --resume goes on" if name == "train" else ""
+    stop_on_interrupt(f"rss-shield {name}: stopping{resumes}")
     try:
         command = importlib.import_module(module)
     except ModuleNotFoundError as error:

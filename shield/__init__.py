@@ -6,7 +6,8 @@ from rss_shield.shield.definitions.longitudinal import (
     d_min_opposite_direction,
     d_min_same_direction,
 )
-from rss_shield.shield.params import PRESETS, ROADS, Preset, Road, RSSParams, Rules, on_road
+from rss_shield.shield.params import PRESETS, ROADS, Preset, Road, RSSParams, Rules, Table, on_road
+from rss_shield.shield.table import table_for
 
 __all__ = [
     "PRESETS",
@@ -15,10 +16,12 @@ __all__ = [
     "RSSParams",
     "Road",
     "Rules",
+    "Table",
     "d_min_lateral",
     "d_min_longitudinal",
     "d_min_opposite_direction",
     "d_min_same_direction",
     "mu_lateral_velocity",
     "on_road",
+    "table_for",
 ]

@@ -252,3 +252,12 @@ class Rules(NamedTuple):
     discretisation_margin: bool = True  # C5: explicit Euler, the last partial braking step
     overlap_margin: float = 0.1  # the simulator flags *predicted* contact, with slip left out [m]
     reverse_speed: float = 1.5  # fastest that the ego may back up (hole H12): walking speed; 0 = never [m/s]
+
+
+class Table(NamedTuple):
+    """The published table that a pair is held to, both by the shield and by the judge."""
+
+    ego: RSSParams  # response times of both in whole frames
+    other: RSSParams
+    rules: Rules
+    dt: float  # length of a frame [s]

@@ -12,14 +12,14 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled_for_arrays as compiled
 from rss_shield.shield.command import Command
-from rss_shield.shield.definitions.kinematics import frames_for
 from rss_shield.shield.definitions.response import LAT, LON
 from rss_shield.shield.geometry import half_extents, largest_half_extents
 from rss_shield.shield.lanes.controller import Body, always_on, find_danger, respond, restrict
 from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.memory import MEMORY, merge, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
-from rss_shield.shield.params import PRESETS, RSSParams, Rules
+from rss_shield.shield.params import PRESETS, RSSParams, Rules, Table
+from rss_shield.shield.sampling import frames_for
 
 HALF_WHEELBASE = 2.5  # [m]
 MAX_SLIP = float(np.arctan(np.tan(np.pi / 3) / 2))  # of highway-env's steering [rad]
@@ -97,7 +97,7 @@ class World(NamedTuple):
     other: RSSParams
     rules: Rules  # of the shield
     steering: Rules  # of its steering
-    table: Rules  # of the others and of the judge
+    published: Rules  # of the others and of the judge
     dt: float
     frames: int
     length: float  # of the cars [m]
@@ -117,12 +117,12 @@ class World(NamedTuple):
 
 
 def world(
-    dt=1 / 15, frames=300, bare=False, ego=None, other=None, rules=None, table=None, steering=None, **fields
+    dt=1 / 15, frames=300, bare=False, ego=None, other=None, rules=None, published=None, steering=None, **fields
 ) -> World:
     """The default table at frame length `dt`, response times in whole frames.
 
     `bare` takes out every spare room that hides a missing margin: wobble width, standstill gap and, by very
-    short cars, the room that a car needs to turn in. The ego anticipates nothing unless `table` or `rules` say so:
+    short cars, the room that a car needs to turn in. The ego anticipates nothing unless `published` or `rules` say so:
     there would be less danger to tell of.
     """
     base = PRESETS["simulator"]
@@ -130,10 +130,10 @@ def world(
     ego, other = base.ego._replace(**spare | (ego or {})), base.other._replace(**spare | (other or {}))
     ego = ego._replace(response_time=float(frames_for(max(ego.response_time, dt), dt) * dt))
     other = other._replace(response_time=float(frames_for(other.response_time, dt) * dt))
-    table = Rules(**{"anticipation": 0.0} | (table or {}))
-    rules = table._replace(**rules or {})
+    published = Rules(**{"anticipation": 0.0} | (published or {}))
+    rules = published._replace(**rules or {})
     return World(
-        ego, other, rules, rules._replace(**steering or {}), table, dt, frames, 0.02 if bare else 5.0, **fields
+        ego, other, rules, rules._replace(**steering or {}), published, dt, frames, 0.02 if bare else 5.0, **fields
     )
 
 
@@ -203,7 +203,7 @@ def _extents(car, w):
     along, across = half_extents(car.length, car.width, car.heading)
     if car.length == OBSTACLE_SIZE:
         return along, across
-    largest = largest_half_extents(car.length, car.width, w.table.heading_bound)
+    largest = largest_half_extents(car.length, car.width, w.published.heading_bound)
     return max(along, largest[0]), max(across, largest[1])
 
 
@@ -211,9 +211,9 @@ def _extents(car, w):
 def margins(ego, car, w):
     """Longitudinal and lateral gap less what the table asks for: the axis is safe from 0 on (Defs. 1, 2, 6)."""
     e, o, dt = w.ego, w.other, w.dt
-    euler = 1.0 if w.table.discretisation_margin else 0.0
+    euler = 1.0 if w.published.discretisation_margin else 0.0
     ahead = car.x >= ego.x
-    straight = np.sqrt(1.0 - w.table.heading_bound**2)
+    straight = np.sqrt(1.0 - w.published.heading_bound**2)
     if car.facing < 0.0:
         need = 0.0
         v_e = ego.speed if ahead else -ego.speed * min(straight, np.cos(ego.heading))
@@ -241,12 +241,12 @@ def margins(ego, car, w):
 
     side = 1.0 if car.y >= ego.y else -1.0
     approach = 0.0
-    need = (e.mu + o.mu) / 2 + w.table.overlap_margin + euler * e.a_lat_max_accel * e.response_time * dt
+    need = (e.mu + o.mu) / 2 + w.published.overlap_margin + euler * e.a_lat_max_accel * e.response_time * dt
     for p, user, to in ((e, ego, side), (o, car, -side)):
         rho, a, b = p.response_time, p.a_lat_max_accel, p.a_lat_min_brake
         speed = _sideways(user, to)
         need += euler * (max(speed, 0.0) * dt / 2 + b * dt**2 / 8)
-        speed = max(speed, 0.0) if w.table.no_credit else speed
+        speed = max(speed, 0.0) if w.published.no_credit else speed
         approach += speed * rho + a * rho**2 / 2 + max(speed + a * rho, 0.0) ** 2 / (2 * b)
     return lon, abs(car.y - ego.y) - half_e[1] - half_o[1] - need - max(approach, 0.0)
 
@@ -296,7 +296,7 @@ def keep_the_law(law, car, acceleration, slip, w):
 @compiled
 def _angle(u, v, w):
     """Largest angle to the lane at which a car of speed v goes sideways no faster than u."""
-    return np.arcsin(min(u / max(v, 1e-3), w.table.heading_bound))
+    return np.arcsin(min(u / max(v, 1e-3), w.published.heading_bound))
 
 
 @compiled
@@ -426,7 +426,7 @@ def _place(rng, car, ego, where, squeeze, w):
             car.speed = _between(rng, 0.0, 3.0) * rng.random()
         if squeeze or w.vice == OVERTAKES:
             car.facing, car.speed = 1.0, ego.speed
-        bound = w.table.heading_bound
+        bound = w.published.heading_bound
         heading = 0.0 if rng.random() < 0.5 else _between(rng, -bound, bound) * rng.random()
         if not w.lawful:
             car.vice = _below(rng, len(VICES)) if w.vice < 0 else w.vice
@@ -481,7 +481,7 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
         for i in range(w.others):
             memory[i].age = memory[i].since = memory[i].axes = 0
             memory[i].skipped = False
-    danger = find_danger(seen, users, last[w.others], last, memory, w.ego, w.other, w.rules, w.dt)
+    danger = find_danger(seen, users, last[w.others], last, memory, Table(w.ego, w.other, w.rules, w.dt))
     response = respond(nominal, danger, seen, BODY, w.rules, w.dt)
     result.overridden += response.overridden
     result.answered_now += (danger.response & 4) != 0
@@ -493,12 +493,12 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
     if w.free_throttle and danger.response & 5 == 0:
         a = max(nominal.acceleration, -ego.speed / w.dt)
     if w.backs_into and ego.speed <= 0.0 and nominal.acceleration < 0.0:
-        a = max(nominal.acceleration, (-w.table.reverse_speed - ego.speed) / w.dt)
+        a = max(nominal.acceleration, (-w.published.reverse_speed - ego.speed) / w.dt)
     if w.soft_brake and danger.response & 1 != 0:
         a = max(a, -ego.speed / 0.6)
     if w.free_wheel and danger.response & 2 == 0:
         gain = max(ego.speed * w.dt / HALF_WHEELBASE, 1e-3)
-        bound = np.arcsin(w.table.heading_bound)
+        bound = np.arcsin(w.published.heading_bound)
         low, high = _arcsin((-bound - ego.heading) / gain), _arcsin((bound - ego.heading) / gain)
         slip = min(max(nominal.slip, low), high)
     if w.steering.heading_bound != w.rules.heading_bound:
@@ -512,7 +512,7 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
 @compiled
 def _judge(command, seen, users, record, law, w, result):
     for i in range(w.others):
-        pair = assess(seen, users[i], w.ego, w.other, w.table, w.dt)
+        pair = assess(seen, users[i], Table(w.ego, w.other, w.published, w.dt))
         remember(record[i], pair, seen, users[i], w.dt)
         if record[i].since > 0 and record[i].axes == LON:
             result.danger_lon += 1
@@ -521,7 +521,7 @@ def _judge(command, seen, users, record, law, w, result):
             result.danger_lat += 1
             result.gap_lat = min(result.gap_lat, pair.gap_lat)
         result.disputed += record[i].since != law[i].since
-    result.broken += judge_frame(seen, users, record, command, 0.0, w.ego, w.other, w.dt)[1]
+    result.broken += judge_frame(seen, users, record, command, 0.0, Table(w.ego, w.other, w.published, w.dt))[1]
     for i in range(w.others):
         result.accused += record[i].other_broke != 0
 
@@ -540,10 +540,10 @@ def episode(rng, w, result, film):
     ego = cars[0]
     ego.length, ego.width, ego.facing = w.length, CAR_WIDTH, 1.0
     ego.speed = _between(rng, 0.0, MAX_SPEED) if rng.random() < 0.95 else 0.0
-    bound = w.table.heading_bound
+    bound = w.published.heading_bound
     ego.heading = 0.0 if rng.random() < 0.5 or w.vice == OVERTAKES else _between(rng, -bound, bound) * rng.random()
     if w.backs_up and rng.random() < 0.7:
-        ego.speed = 0.0 if rng.random() < 0.8 else -w.table.reverse_speed * rng.random()
+        ego.speed = 0.0 if rng.random() < 0.8 else -w.published.reverse_speed * rng.random()
     ego.u, ego.along = ego.speed * np.sin(ego.heading), ego.speed * np.cos(ego.heading)
     may_reverse = not w.shielded and rng.random() < 0.3
     squeeze = rng.random() < 0.2
@@ -598,7 +598,7 @@ def episode(rng, w, result, film):
             if now or soon:
                 _as_seen(ego, seen[0], w)
                 _as_seen(cars[1 + i], users[i], w)
-                verdict = judge_contact(seen[0], users[i], record[i], w.ego, w.other, w.table, w.dt)
+                verdict = judge_contact(seen[0], users[i], record[i], Table(w.ego, w.other, w.published, w.dt))
                 result.contact, result.boxes, result.partner, result.verdict = frame + 1, now, i, verdict.verdict
                 result.ego_duty, result.ego_excess = verdict.ego_duty, verdict.ego_excess
                 result.other_duty, result.other_excess = verdict.other_duty, verdict.other_excess

@@ -12,6 +12,7 @@ from rss_shield.envs.stock import drivers_unchanged
 # whole episodes, many of them, or new processes: left out by `make test-fast`
 SLOW = frozenset(
     [
+        "agents/test_baselines",
         "agents/test_ppo",
         "envs/test_arguments",
         "envs/test_backing_up",
@@ -28,6 +29,7 @@ SLOW = frozenset(
         "envs/test_multi_agent",
         "envs/test_parallel_env",
         "envs/test_random_roads",
+        "envs/test_recorder",
         "envs/test_roads",
         "envs/test_several_contacts",
         "envs/test_shielded_traffic",
@@ -38,16 +40,21 @@ SLOW = frozenset(
         "envs/test_wrapper",
         "eval/test_backends",
         "eval/test_learning_curve",
+        "eval/test_offline_judge",
         "eval/test_paper",
         "eval/test_replay",
+        "eval/test_replay_page",
         "eval/test_rollout",
         "eval/test_stats_coverage",
+        "eval/test_trace_risk",
+        "fast/test_action_masks",
         "fast/test_adapter",
         "fast/test_floats",
         "fast/test_intersection",
         "fast/test_neighbours",
         "fast/test_parity",
         "fast/test_recording",
+        "fast/test_risk",
         "fast/test_ufuncs",
         "fast/test_vector",
         "shield/test_adrss_oracle",
@@ -69,8 +76,10 @@ SLOW = frozenset(
         "shield/test_theorems",
         "shield/test_comfort",
         "shield/test_def18_junction_response",
+        "test_campaign",
         "test_install",
         "test_pages",
+        "test_test_command",
         "test_train_cli",
     ]
 )

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from rss_shield.shield.definitions.longitudinal import euler_margin
 from rss_shield.shield.definitions.right_of_way import (
     APART,
     ORDER,
@@ -21,10 +20,10 @@ from rss_shield.shield.definitions.right_of_way import (
     junction_items,
     junction_response,
     step_junction,
-    with_euler_margin,
     would_strand,
 )
 from rss_shield.shield.params import PRESETS
+from rss_shield.shield.sampling import euler_margin, with_euler_margin
 
 DT = 1 / 15  # [s]
 AREA = 6.0  # way through the conflict area [m]

@@ -11,8 +11,8 @@ from rss_shield.shield.junctions.conflict_areas import cell_of, in_conflict
 from rss_shield.shield.junctions.controller import CAUTIOUS, CROSSING, PLAN, SAMPLE, judge_crossing, junction_frame
 from rss_shield.shield.junctions.examined import TABLE as TABLE_ONLY
 from rss_shield.shield.junctions.plans import THREAT, Scene, Track
-from rss_shield.shield.lanes.judge import VERDICTS
 from rss_shield.shield.params import PRESETS
+from rss_shield.shield.verdicts import VERDICTS
 
 DT = 1 / 15
 TABLE = PRESETS["intersection"]

@@ -12,7 +12,13 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 PAGES = [path for path in PAGES if not {"_build", "api"} & set(path.relative_to(ROOT).parts)]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL)
-BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "start.md").read_text(encoding="utf-8"), re.DOTALL)
+BLOCKS = [
+    block
+    for page in ("start", "filters")
+    for block in re.findall(
+        r"```python\n(.*?)```", (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"), re.DOTALL
+    )
+]
 CODE = re.compile(r"\b[HCWMJ]\d+y?\b")
 SOURCES = [path for folder in ("shield", "envs", "agents", "eval") for path in sorted((ROOT / folder).rglob("*.py"))]
 
@@ -25,6 +31,7 @@ SCRIPTS = {
     "parameters_and_rules": "an ablation, judged in full: blame ego",
     "judge_a_log": "blame: ego\nthe ego: braked less than the proper response asks",
     "baseline": "the shield: at fault in 0 of 5",
+    "drive_and_test": "drive_and_test:drive on highway-fast-v0, 20 episodes",
 }
 
 
@@ -37,8 +44,8 @@ def test_an_example_of_the_readme_prints_what_stands_below_it(code, printed):
 
 
 @pytest.mark.parametrize("code", BLOCKS, ids=[block.splitlines()[0][:40] for block in BLOCKS])
-def test_a_block_of_getting_started_runs(code, capsys):
-    exec(compile(code.replace("1_000", "256"), "start.md", "exec"), {})
+def test_a_block_of_a_page_runs(code, capsys):
+    exec(compile(code.replace("1_000", "256"), "page.md", "exec"), {})
 
 
 def test_the_readme_is_one_page_and_says_how_to_begin():

@@ -55,7 +55,8 @@ class Stage(NamedTuple):
 
 def without_anticipation(settings: Any) -> Any:
     """`Settings` to look ahead with."""
-    return settings._replace(rules=settings.rules._replace(anticipation=0.0))
+    calm = settings.table.rules._replace(anticipation=0.0)
+    return settings._replace(table=settings.table._replace(rules=calm))
 
 
 def make_stage(n: int) -> Stage:
@@ -65,7 +66,7 @@ def make_stage(n: int) -> Stage:
 
 
 @apart
-def first_response(seen, stage, aim, body, frames, ego_params, other_params, rules, dt, who=None):
+def first_response(seen, stage, aim, body, frames, table, who=None):
     """Frame of the coming decision on which a duty first changes the command, or a lane change is taken back.
 
     Args:
@@ -74,7 +75,7 @@ def first_response(seen, stage, aim, body, frames, ego_params, other_params, rul
       aim: `Aim`.
       body: `Body` of the ego.
       frames: of a decision.
-      ego_params, other_params, rules, dt: as in `shield.lanes.controller.find_danger`; without anticipation.
+      table: as in `shield.lanes.controller.find_danger`; without anticipation.
       who: `[K]` indices of those who can matter, None = everybody.
 
     Returns:
@@ -83,9 +84,9 @@ def first_response(seen, stage, aim, body, frames, ego_params, other_params, rul
     _set(stage, seen, who)
     ego, before, half_length = stage.ego[0], stage.ego[1], body.half_wheelbase
     start, users = ego.y, stage.users
+    rules, dt = table.rules, table.dt
     for frame in range(frames):
-        rules_of_all = ego_params, other_params, rules, dt
-        danger = find_danger(ego, users, before, stage.users_before, stage.memory, *rules_of_all, who, _NOBODY, _NOBODY)
+        danger = find_danger(ego, users, before, stage.users_before, stage.memory, table, who, _NOBODY, _NOBODY)
         offset = aim.offset + ego.y - start
         if rules.take_back and is_blocked(offset, danger.room_left, danger.room_right):
             return frame

@@ -28,19 +28,17 @@ from rss_shield.envs.fast.guard import (
     check_contact,
     compile_ways,
     distances_of,
-    is_at_fault,
     make_watch,
     no_ways,
     plans_of,
     refuse_lane_change,
-    report_comfort,
-    start_tally,
     start_watch,
     watch_frame,
 )
 from rss_shield.envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past, no_lane_frames
 from rss_shield.envs.fast.observations import observe
 from rss_shield.envs.fast.rewards import NO_ACTION, is_terminated, is_truncated, rate
+from rss_shield.envs.fast.risk import RISK, Field, begin_looks, compile_field, meter_of, report_risk, start_risk
 from rss_shield.envs.fast.scenes import make_scene
 from rss_shield.envs.fast.sight import make_sight, sort_along_x
 from rss_shield.envs.fast.state import CAR, EPISODE, STEP
@@ -52,10 +50,13 @@ from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, ra
 from rss_shield.shield.comfort import RIDE
 from rss_shield.shield.junctions.controller import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.risk import RiskSettings
+from rss_shield.shield.table import table_for
+from rss_shield.shield.tally import end_decision, start_decision
+from rss_shield.shield.verdicts import charges_ego
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
 DECIDE, RESTART, STAY = range(3)  # what an environment does on a call
-_LONGEST_TTC = 100.0  # [s]
 _PATIENCE = 6.0  # seconds of silence before the first call explains itself
 
 
@@ -75,6 +76,7 @@ class World(NamedTuple):
     ranges: np.ndarray
     connected: np.ndarray
     lane_odds: np.ndarray
+    field: Field | None  # of the measure of risk, where somebody asked for it
 
 
 class Batch(NamedTuple):
@@ -87,6 +89,7 @@ class Batch(NamedTuple):
     past: Past | None  # with `World.frames`
     crossings: np.ndarray | None  # `[E, N]` CROSSING, with `World.ways`
     rides: np.ndarray  # `[E]` RIDE
+    risks: np.ndarray | None  # `[E]` RISK, with `World.field`
 
 
 class Inputs(NamedTuple):
@@ -107,6 +110,8 @@ class Outputs(NamedTuple):
     steps: np.ndarray  # `[E]` STEP, of the new episode where one began
     final_observations: np.ndarray  # `[E, size]` written where an episode ended and another began
     final_steps: np.ndarray  # `[E]` STEP, likewise
+    risks: np.ndarray | None  # `[E]` RISK, of the new episode where one began; with `World.field`
+    final_risks: np.ndarray | None  # `[E]` likewise, written where an episode ended and another began
 
 
 class Film(NamedTuple):
@@ -136,7 +141,7 @@ def _go_on(cars, episode, order, world, plans, watch, mode, flow):
 
 
 @rare
-def _restart(cars, episode, order, world, sight, distances, plans, ride, watch, mode, step, out):
+def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, mode, step, out):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
     _populate(cars, episode, order, world, sight, world.flow)
@@ -144,7 +149,8 @@ def _restart(cars, episode, order, world, sight, distances, plans, ride, watch, 
     survey(cars, episode, world.network, sight, world.flow)
     sort_along_x(cars, episode.cars, order)
     start_watch(episode, distances, plans, ride, watch)
-    start_tally(step)
+    start_risk(meter)
+    start_decision(step)
     step.raw_reward = rate(cars, episode, NO_ACTION, lanes, sight, config, step)
     _report(cars, episode, ride, mode, 0.0, step)
     _see_apart(cars, episode, world, sight, out)
@@ -179,32 +185,20 @@ def _report(cars, episode, ride, mode, cost, step):
     step.speed, step.crashed, step.time = ego.speed, ego.crashed, episode.time
     step.episode_return, step.episode_length = episode.return_, episode.steps
     if mode != OFF:
-        episode.cost += cost
-        step.cost, step.episode_cost = cost, episode.cost
-        frames = max(episode.frames, 1)
-        step.override_share = episode.frames_overridden / frames
-        step.anticipation_share = episode.frames_anticipated / frames
-        step.limited_share = episode.frames_limited / frames
-        step.mean_acceleration_change = episode.acceleration_changed / frames
-        step.mean_steering_change = episode.steering_changed / frames
-        report_comfort(ride, step)
-        step.episode_dangerous_pairs = episode.dangerous_pairs
-        step.episode_broken_duties = episode.broken_duties
-        step.min_ttc = min(episode.min_ttc, _LONGEST_TTC)
-        step.blame, step.blame_partner = episode.blame, episode.blame_partner
-        step.blame_axes, step.blame_frames = episode.blame_axes, episode.blame_frames
-        step.ego_duty, step.ego_excess = episode.ego_duty, episode.ego_excess
-        step.other_duty, step.other_excess = episode.other_duty, episode.other_excess
+        end_decision(step, episode, ride, cost)
 
 
 @unfolded
-def _advance(e, cars, episode, order, world, sight, distances, plans, ride, watch, settings, mode, inputs, film, step):
+def _advance(
+    e, cars, episode, order, world, sight, distances, plans, ride, meter, watch, settings, mode, inputs, film, step
+):
     """One decision of one environment, frame by frame."""
     config, net, flow = world.config[0], world.network, world.flow
     lanes = net.lanes
     ego = cars[episode.ego]
     survey(cars, episode, net, sight, flow)
-    start_tally(step)
+    start_decision(step)
+    begin_looks(meter)
     had_contact = episode.blame != 0
     for frame in range(config.frames):
         if frame == 0:
@@ -224,7 +218,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, ride, watc
         while first < episode.vehicles:  # a loop, lest the kernel contain it twice
             changing = think(cars, episode, first, last, changing, net, sight, config)
             if first == 0 and mode != OFF:
-                watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, settings, step)
+                watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watch, settings, step)
             first, last = last, episode.vehicles
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
@@ -235,7 +229,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, ride, watc
     cost = 0.0
     if mode != OFF:
         check_contact(cars, episode, lanes, sight, distances, plans, watch, settings)
-        if step.broken_duties > 0 or (not had_contact and is_at_fault(episode.blame)):
+        if step.broken_duties > 0 or (not had_contact and charges_ego(episode.blame - 1)):
             cost = 1.0
     return cost
 
@@ -247,19 +241,36 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
     for e in range(first, last):
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
         distances, plans = distances_of(e, world.frames, batch.past), plans_of(e, world.ways, batch.crossings)
-        observation, ride = outputs.observations[e], batch.rides[e]
+        observation, ride, meter = outputs.observations[e], batch.rides[e], meter_of(e, world.field, batch.risks)
         outputs.rewards[e] = 0.0
         outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
             survey(cars, episode, world.network, sight, world.flow)
             _see_apart(cars, episode, world, sight, observation)
             _report(cars, episode, ride, mode, 0.0, step)
+            report_risk(e, meter, outputs.risks)
             continue
         if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
-            _restart(cars, episode, order, world, sight, distances, plans, ride, watch, mode, step, observation)
+            _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, mode, step, observation)
+            report_risk(e, meter, outputs.risks)
             continue
         cost = _advance(
-            e, cars, episode, order, world, sight, distances, plans, ride, watch, settings, mode, inputs, film, step
+            e,
+            cars,
+            episode,
+            order,
+            world,
+            sight,
+            distances,
+            plans,
+            ride,
+            meter,
+            watch,
+            settings,
+            mode,
+            inputs,
+            film,
+            step,
         )
         _see(cars, episode, world, sight, observation)
         reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
@@ -272,12 +283,15 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
         outputs.truncated[e] = is_truncated(episode, config)
         episode.ended = outputs.terminated[e] or outputs.truncated[e]
         _report(cars, episode, ride, mode, cost, step)
+        report_risk(e, meter, outputs.risks)
         _go_on(cars, episode, order, world, plans, watch, mode, world.flow)
         if episode.ended and autoreset == SAME_STEP:
             for k in range(len(observation)):
                 outputs.final_observations[e, k] = observation[k]
             outputs.final_steps[e] = step
-            _restart(cars, episode, order, world, sight, distances, plans, ride, watch, mode, step, observation)
+            report_risk(e, meter, outputs.final_risks)
+            _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, mode, step, observation)
+            report_risk(e, meter, outputs.risks)
 
 
 class Engine:
@@ -291,6 +305,7 @@ class Engine:
       autoreset: DISABLED, SAME_STEP or NEXT_STEP.
       threads: how many threads share the work.
       by_change: the penalty is times the mean change of acceleration instead [m/s^2].
+      risk: settings of the measure of risk around each ego, None = nobody asked; it needs a shield.
     """
 
     def __init__(
@@ -302,6 +317,7 @@ class Engine:
         autoreset: int = SAME_STEP,
         threads: int = 1,
         by_change: bool = False,
+        risk: RiskSettings | None = None,
     ) -> None:
         n = scenario.capacity
         self.scenario = scenario
@@ -309,7 +325,7 @@ class Engine:
         self.autoreset = autoreset
         self.mode = OFF if settings is None else OVERRIDE if settings.overrides else MONITOR
         self.penalty, self.by_change = float(penalty), bool(by_change)
-        self.settings = settings or Settings(*PRESETS["simulator"][:2], Rules(), False, 1.0)
+        self.settings = settings or Settings(table_for(PRESETS["simulator"], Rules(), 1.0), False)
         network, net = scenario.stock.road.network, scenario.network
         watched = n if settings else 0
         frames = ways = past = crossings = None
@@ -331,6 +347,7 @@ class Engine:
             scenario.ranges,
             scenario.connected,
             scenario.lane_odds,
+            None if risk is None else compile_field(network, risk, self.settings),
         )
         self.batch = Batch(
             np.zeros((num_envs, n), CAR),
@@ -339,6 +356,7 @@ class Engine:
             past,
             crossings,
             np.zeros(num_envs, RIDE),
+            None if risk is None else np.zeros(num_envs, RISK),
         )
         self.film = Film(np.full(num_envs, -1, np.int64), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
         self._seen: np.ndarray | None = None  # last observations
@@ -349,7 +367,7 @@ class Engine:
         config = scenario.config[0]
         sizes = len(scenario.network.lanes), n, config["speeds"], config["lanes"], config["times"]
         self._sights = [make_sight(*sizes) for _ in range(threads)]
-        self._watch = make_watch(self.settings.rules.heading_bound)
+        self._watch = make_watch(self.settings.table.rules.heading_bound)
         self._calm = without_anticipation(self.settings)
         self._desks = [make_desk(n, len(scenario.labels)) for _ in range(threads)]
 
@@ -410,6 +428,8 @@ class Engine:
             np.zeros(e, STEP),
             np.zeros((e, self._size), np.float32),
             np.zeros(e, STEP),
+            None if self.batch.risks is None else np.zeros(e, RISK),
+            None if self.batch.risks is None else np.zeros(e, RISK),
         )
         rules = (self.settings, self.mode, self.penalty, self.by_change, self.autoreset)
         common = (self.world, self.batch, inputs, outputs, self.film, self._watch, *rules)

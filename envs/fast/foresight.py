@@ -100,7 +100,7 @@ def _foresee_on_lanes(e, cars, episode, sight, desk, world, batch, watch, settin
     config, net, lanes, past = world.config[0], world.network, world.network.lanes, desk.past
     _copy_past(past, batch.past, e, episode.cars)
     desk.episode[0] = episode
-    copy, car, dt = desk.episode[0], cars[episode.ego], settings.dt
+    copy, car = desk.episode[0], cars[episode.ego]
     distances, near = Distances(world.frames, past), _margin_that_matters(cars, episode, config, settings)
     bend = measure(cars, copy, lanes, sight, distances, watch.boxes, settings, False, -np.inf, -np.inf, near)
     me = past.ego[copy.turn]
@@ -119,9 +119,7 @@ def _foresee_on_lanes(e, cars, episode, sight, desk, world, batch, watch, settin
         else:
             ahead = heading_at(lanes[k], sight.s[k, episode.ego] + car.speed * PURSUIT)
             aim = Aim(car.target_speed, sight.lateral[k, episode.ego], ahead - (car.heading - me.heading))
-            desk.first[a] = first_response(
-                seen, desk.stage, aim, body, config.frames, settings.ego, settings.other, settings.rules, dt, who
-            )
+            desk.first[a] = first_response(seen, desk.stage, aim, body, config.frames, settings.table, who)
         _put_back(car, before)
 
 
@@ -152,7 +150,7 @@ def _margin_that_matters(cars, episode, config, settings):
         car = cars[i]
         along = car.speed * (car.cos * ego.cos + car.sin * ego.sin)
         slowest, fastest = (along, along) if i == 0 else (min(slowest, along), max(fastest, car.speed))
-    return within(ego.speed, slowest, fastest, config.frames * settings.dt, settings.ego)
+    return within(ego.speed, slowest, fastest, config.frames * settings.table.dt, settings.table.ego)
 
 
 # ---------------------------------------------------------------- plans

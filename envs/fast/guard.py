@@ -12,6 +12,7 @@ from rss_shield.envs._numpy.floats import norm
 from rss_shield.envs._numpy.ufuncs import arctan, tan
 from rss_shield.envs.fast.collisions import is_near, overlap
 from rss_shield.envs.fast.neighbours import Distances, Past, car_of, measure, row_before, start_past
+from rss_shield.envs.fast.risk import look_at_risk
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network
 from rss_shield.envs.roads.steering import MAX_SLIP
@@ -26,7 +27,7 @@ from rss_shield.envs.roads.ways import (
     track_of,
 )
 from rss_shield.shield._numba.compiled import inner, part, rare
-from rss_shield.shield.comfort import comfort_of, ride_on
+from rss_shield.shield.comfort import ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import largest_half_extents
@@ -35,12 +36,13 @@ from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.plans import Scene
 from rss_shield.shield.lanes.controller import Body, Response, find_danger, respond
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
-from rss_shield.shield.lanes.judge import BOTH, EGO, NOBODY, OTHER, judge_contact, judge_frame
+from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up
+from rss_shield.shield.tally import count_change, count_frame, enter_contact, note_executed, start_episode
+from rss_shield.shield.verdicts import weight_of
 
 OFF, MONITOR, OVERRIDE = range(3)
-_PLANS = 4  # kinds of danger from here on are plans, in `infos`
 
 
 class Ways(NamedTuple):
@@ -131,14 +133,7 @@ def start_watch(episode, distances, plans, ride, watch):
     episode.held_at, episode.wronged, episode.answers = np.inf, False, False
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
-    episode.frames = episode.frames_overridden = episode.frames_anticipated = episode.frames_limited = 0
-    episode.acceleration_changed = episode.steering_changed = 0.0
-    episode.dangerous_pairs = episode.broken_duties = 0
-    episode.cost = 0.0
-    episode.min_ttc = np.inf
-    episode.blame = episode.blame_axes = episode.blame_frames = episode.ego_duty = episode.other_duty = 0
-    episode.blame_partner = -1
-    episode.ego_excess = episode.other_excess = 0.0
+    start_episode(episode)
 
 
 @part
@@ -156,19 +151,7 @@ def carry_over(episode, cars, crossings, ego, watch):
 
 
 @inner
-def start_tally(step):
-    """Nothing has happened in this decision yet."""
-    step.frames = step.overridden = step.anticipated = step.limited = 0
-    step.dangerous_pairs = step.broken_duties = 0
-    step.acceleration = step.steering = 0.0
-    step.acceleration_change = step.steering_change = step.acceleration_changed = step.steering_changed = 0.0
-    step.lane_change_refused = False
-    step.margin_lon = step.margin_lat = np.inf
-    step.partner, step.response = -1, 0
-
-
-@inner
-def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, settings, step):
+def watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watch, settings, step):
     """Restrict the ego's command on one frame, unless it has had its contact.
 
     Args:
@@ -178,6 +161,7 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, sett
       sight: this frame's.
       distances, plans: `Distances` or `Plans`; the other is None.
       ride: RIDE.
+      meter: of risk; None = nobody asked.
       watch: `Watch`.
       settings: `envs.highway.ego.Settings`.
       step: STEP, the tally is kept there.
@@ -191,7 +175,8 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, ride, watch, sett
         _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step)
         gap = sight.z[0]
     ego = cars[episode.ego]
-    ride_on(ride, ego.speed, ego.heading, gap, settings.dt)
+    ride_on(ride, ego.speed, ego.heading, gap, settings.table.dt)
+    look_at_risk(cars, episode, lanes, sight, distances, meter)
 
 
 @inner
@@ -215,10 +200,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         past.ego[row_before(episode)],
         sight.users_before,
         memory,
-        settings.ego,
-        settings.other,
-        settings.rules,
-        settings.dt,
+        settings.table,
         who,
         nearest,
         soonest,
@@ -235,21 +217,19 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
             response = _answer(wish, car, danger, episode, sight, distances, body, settings, step)
         else:
             wanted = _take_back(wish, car, ego, episode, lanes, sight, body, settings, step)
-            response = respond(wanted, danger, ego, body, settings.rules, settings.dt)
+            response = respond(wanted, danger, ego, body, settings.table.rules, settings.table.dt)
             if settings.correction == RESPONSE:
-                response = in_full(response, danger, ego, body, settings.rules, settings.dt)
+                response = in_full(response, danger, ego, body, settings.table.rules, settings.table.dt)
         command, steered = response.command, steering
         if command.slip != wish.slip:
             steered = arctan(2.0 * tan(command.slip))
         car.acceleration, car.steering = command.acceleration, steered
-        _count_change(episode, step, abs(command.acceleration - acceleration), abs(steered - steering))
-    _note_executed(step, car.acceleration, car.steering)
+        count_change(step, episode, abs(command.acceleration - acceleration), abs(steered - steering))
+    note_executed(step, car.acceleration, car.steering)
     pairs = broken = 0
     if danger.dangerous:
-        pairs, broken = judge_frame(
-            ego, users, memory, response.command, bend.curvature, settings.ego, settings.other, settings.dt, who
-        )
-    _count(episode, step, danger, response, response.anticipated, pairs, broken, settings.overrides)
+        pairs, broken = judge_frame(ego, users, memory, response.command, bend.curvature, settings.table, who)
+    _count(episode, step, danger, response, pairs, broken, settings.overrides)
     if danger.partner >= 0:
         step.margin_lon, step.margin_lat = danger.margin_lon, danger.margin_lat
         step.partner = car_of(danger.partner, episode)
@@ -269,10 +249,7 @@ def _answer(wish, car, danger, episode, sight, distances, body, settings, step):
         episode.answers,
         step.frames == 0,
         body,
-        settings.ego,
-        settings.other,
-        settings.rules,
-        settings.dt,
+        settings.table,
     )
     return response
 
@@ -292,60 +269,29 @@ def _keep_plan(cars, episode, sight, plans, settings, step):
         not settings.waits_anywhere,
         settings.examine,
         settings.overrides,
-        settings.rules.anticipation,
+        settings.table.rules.anticipation,
     )
     if settings.overrides:
         if report.overridden and step.partner < 0:
             held = held_by(scene, car.acceleration, n, not settings.waits_anywhere)
             step.partner = car_of(held, episode) if held >= 0 else -1
-        _count_change(episode, step, abs(report.acceleration - car.acceleration), 0.0)
+        count_change(step, episode, abs(report.acceleration - car.acceleration), 0.0)
         car.acceleration = report.acceleration
-    _note_executed(step, car.acceleration, car.steering)
-    _count(episode, step, report, report, report.anticipated, report.pairs, report.broken, settings.overrides)
+    note_executed(step, car.acceleration, car.steering)
+    _count(episode, step, report, report, report.pairs, report.broken, settings.overrides)
     episode.frames_trapped += report.trapped
     episode.pairs_examined += report.examined
     episode.pairs_possible += report.possible
 
 
 @inner
-def _count(episode, step, danger, response, anticipated, pairs, broken, overrides):
+def _count(episode, step, danger, response, pairs, broken, overrides):
     """Take what happened on one frame into the tally."""
     overridden = (response.overridden or episode.refused) and overrides
-    limited = response.limited and not overridden and overrides
+    anticipated, limited = response.anticipated and overrides, response.limited and overrides
     step.lane_change_refused = step.lane_change_refused or episode.refused
     episode.refused = False
-    step.frames += 1
-    step.overridden += overridden
-    step.anticipated += anticipated and overrides
-    step.limited += limited
-    episode.frames_anticipated += anticipated and overrides
-    episode.frames_limited += limited
-    step.dangerous_pairs += pairs
-    step.broken_duties += broken
-    step.response |= danger.response
-    episode.dangerous_pairs += pairs
-    episode.broken_duties += broken
-    episode.frames += 1
-    episode.frames_overridden += overridden
-    episode.min_ttc = min(episode.min_ttc, danger.ttc)
-
-
-@inner
-def _note_executed(step, acceleration, steering):
-    """Take what the ego does on one frame into the sums [m/s^2], [rad]."""
-    step.acceleration += acceleration
-    step.steering += steering
-
-
-@inner
-def _count_change(episode, step, acceleration, steering):
-    """Take the sizes of what was changed on one frame into the tally [m/s^2], [rad]."""
-    step.acceleration_change = max(step.acceleration_change, acceleration)
-    step.steering_change = max(step.steering_change, steering)
-    step.acceleration_changed += acceleration
-    step.steering_changed += steering
-    episode.acceleration_changed += acceleration
-    episode.steering_changed += steering
+    count_frame(step, episode, overridden, anticipated, limited, pairs, broken, danger.response, danger.ttc)
 
 
 @inner
@@ -358,13 +304,6 @@ def start_ride(ride):
         ride.bin[quantity] = ride.above[quantity] = 0
         for b in range(ride.counts.shape[1]):
             ride.counts[quantity, b] = 0
-
-
-@part
-def report_comfort(ride, step):
-    """Fill in how the ride has felt so far."""
-    for k, value in enumerate(comfort_of(ride)):
-        step.comfort[k] = value
 
 
 # ---------------------------------------------------------------- lane changes
@@ -386,7 +325,7 @@ def refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, se
 @part
 def _refuse_blocked(before, cars, episode, lanes, sight, settings, step):
     ego = cars[episode.ego]
-    if not settings.overrides or not settings.rules.take_back or episode.blame != 0 or ego.kind != META:
+    if not settings.overrides or not settings.table.rules.take_back or episode.blame != 0 or ego.kind != META:
         return
     if is_refused(before, ego, episode, lanes, sight, settings):
         ego.target_lane = before
@@ -397,7 +336,7 @@ def _refuse_blocked(before, cars, episode, lanes, sight, settings, step):
 def is_refused(before, ego, episode, lanes, sight, settings):
     """Is the ego's change from lane `before` to its target blocked, or does it come half-way through another?"""
     k = ego.target_lane
-    if not settings.rules.take_back or k == before or lanes[k].road != lanes[before].road:
+    if not settings.table.rules.take_back or k == before or lanes[k].road != lanes[before].road:
         return False
     offsets = sight.lateral[ego.lane, episode.ego], sight.lateral[before, episode.ego]
     return turns_back(*offsets, k - before) or _is_blocked(k, episode, sight)
@@ -413,11 +352,11 @@ def _is_blocked(k, episode, sight):
 def _take_back(wish, car, ego, episode, lanes, sight, body, settings, step):
     """`envs.highway.ego.ShieldedEgo._taken_back`: what the agent wants, and the lane that it heads for from now on."""
     slip = wish.slip
-    if settings.rules.take_back and car.kind == DIRECT:
+    if settings.table.rules.take_back and car.kind == DIRECT:
         rooms = episode.room_left, episode.room_right
         width = lanes[car.lane].width
-        slip = lead_back(slip, ego, width, *rooms, body.half_wheelbase, body.curvature, settings.dt)
-    if settings.rules.take_back and car.kind == META:
+        slip = lead_back(slip, ego, width, *rooms, body.half_wheelbase, body.curvature, settings.table.dt)
+    if settings.table.rules.take_back and car.kind == META:
         lane = _reachable(car.lane, car.target_lane, episode, lanes, sight)
         step.lane_change_refused = step.lane_change_refused or lane != car.target_lane
         car.target_lane = lane
@@ -479,7 +418,7 @@ def scene_of(cars, episode, sight, plans, settings, judging):
         sight.on_road[:n],
         plans.crossings[:n],
         settings.intent,
-        settings.other.v_cap,
+        settings.table.other.v_cap,
         sight.samples,
         sight.threats,
         sight.box,
@@ -488,7 +427,9 @@ def scene_of(cars, episode, sight, plans, settings, judging):
         episode.overflow = True
     count = min(count, len(sight.threats))
     drift = drift_of(roads, sight.on_road[n], track)
-    return Scene(roads.paths, track, sight.threats[:count], settings.ego, settings.other, settings.dt, drift)
+    return Scene(
+        roads.paths, track, sight.threats[:count], settings.table.ego, settings.table.other, settings.table.dt, drift
+    )
 
 
 @inner
@@ -518,7 +459,7 @@ def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings
 
 @rare
 def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
-    count, heaviest = _list_partners(cars, episode, sight, settings.dt), -1
+    count, heaviest = _list_partners(cars, episode, sight, settings.table.dt), -1
     if distances is not None:
         episode.near, past = count, distances.past
         for a in range(count):
@@ -526,14 +467,11 @@ def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
         measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf, -np.inf)
     for a in range(count):
         i = sight.some[a]
-        verdict, axes = _verdict(i, cars, episode, sight, distances, plans, settings)
-        weight = _weight(verdict.verdict)
+        verdict = _verdict(i, cars, episode, sight, distances, plans, settings)
+        weight = weight_of(verdict.verdict)
         if weight > heaviest:
             heaviest = weight
-            episode.blame, episode.blame_partner = 1 + verdict.verdict, car_of(i, episode)
-            episode.blame_axes, episode.blame_frames = axes, verdict.frames
-            episode.ego_duty, episode.ego_excess = verdict.ego_duty, verdict.ego_excess
-            episode.other_duty, episode.other_excess = verdict.other_duty, verdict.other_excess
+            enter_contact(episode, verdict, car_of(i, episode), plans is not None)
 
 
 @part
@@ -556,32 +494,18 @@ def _list_partners(cars, episode, sight, dt):
 
 @rare
 def _verdict(i, cars, episode, sight, distances, plans, settings):
-    """Who is to blame for the contact with road user `i`, and where the danger came from, as in `infos`."""
-    ego, other, rules, dt = settings.ego, settings.other, settings.rules, settings.dt
+    """Who is to blame for the contact with road user `i`."""
+    table = settings.table
     if plans is not None:
         scene = scene_of(cars, episode, sight, plans, settings, True)
         outside = is_outside(scene.paths, scene.threats, i, sight.on_road[i])
-        verdict = judge_crossing(sight.samples[i], plans.crossings[i], outside, other, dt)
-        axes = verdict.axes + _PLANS
+        verdict = judge_crossing(sight.samples[i], plans.crossings[i], outside, table.other, table.dt)
     if distances is not None:
         past = distances.past
         memory, me = past.memory[i], past.ego[episode.turn]
-        catch_up(memory, past.ego[row_before(episode)], sight.users_before[i], ego, other, rules, dt)
-        verdict = judge_contact(me, sight.users[i], memory, ego, other, rules, dt)
-        axes = verdict.axes
-    return verdict, axes
-
-
-@part
-def _weight(verdict):
-    """Of several contacts at once, the one that weighs most against the ego counts."""
-    if verdict == NOBODY:
-        return 4
-    if verdict == EGO:
-        return 3
-    if verdict == BOTH:
-        return 2
-    return 1 if verdict == OTHER else 0
+        catch_up(memory, past.ego[row_before(episode)], sight.users_before[i], table)
+        verdict = judge_contact(me, sight.users[i], memory, table)
+    return verdict
 
 
 @part
@@ -591,9 +515,3 @@ def _touches(cars, k, ego, sight, dt):
         return False
     touches, will_touch, _, _ = overlap(first, second, sight.corners, dt)
     return touches or will_touch
-
-
-@inner
-def is_at_fault(blame):
-    """Does a blame code charge the ego?"""
-    return blame == 1 + EGO or blame == 1 + BOTH

@@ -18,7 +18,7 @@ def measures_of(log: Log, settings: Settings, partner: int = -1) -> Measures:
       settings: of the shield that was there.
       partner: row of whom the ego touched, -1: nobody.
     """
-    meter = EpisodeMeter(settings.dt, settings.scheme != LANES)
+    meter = EpisodeMeter(settings.table.dt, settings.scheme != LANES)
     for k, (cars, count) in enumerate(zip(log.cars, log.present, strict=True)):
         present = cars[:count]
         (ego,) = np.flatnonzero(np.isin(present["kind"], (META, DIRECT)))

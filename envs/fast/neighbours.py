@@ -67,7 +67,7 @@ class Distances(NamedTuple):
 
 def compile_lane_frames(network, settings: Settings) -> LaneFrames:
     """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`: one each, because its lanes do not fork."""
-    reach = reach_of(settings.ego, settings.other, settings.dt)
+    reach = reach_of(settings.table.ego, settings.table.other, settings.table.dt)
     lanes = [road_through(network, index, reach) for index in network.lanes_dict()]
     same = np.array([[same_frame(a, b) for b in lanes] for a in lanes])
     return LaneFrames(np.concatenate(lanes), np.cumsum([0, *map(len, lanes)]), same)
@@ -132,7 +132,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     Returns:
       `shield.lanes.frame.Bend` under the ego.
     """
-    frames, past, ego, dt = distances.frames, distances.past, cars[episode.ego], settings.dt
+    frames, past, ego, dt = distances.frames, distances.past, cars[episode.ego], settings.table.dt
     episode.turn = _row(episode, 1)
     lane_before, jumps = _choose_frame(episode, distances, ego.lane)
     now, before, earlier = past.trail[episode.turn], past.trail[row_before(episode)], past.trail[_row(episode, 1)]
@@ -148,7 +148,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     sight.z[0] = np.inf  # gap ahead
     threshold = _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest)
     if not chosen:
-        far = beyond_doubt(me.speed, settings.ego, dt)
+        far = beyond_doubt(me.speed, settings.table.ego, dt)
         _choose_near(episode, past, sight.x, max(min(threshold, nearest), far, within) + _ROUNDING)
     for a in range(episode.near):
         i = past.near[a]
@@ -234,11 +234,11 @@ def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings
     """
     straight, bounds = is_straight(road), sight.x
     cos, sin = road[0, COS], road[0, SIN]
-    share = own_share(me.speed, me.cos, settings.ego, settings.dt)
-    lead, least_cos = leading_speed(me, settings.rules), least_cosine(settings.rules)
+    share = own_share(me.speed, me.cos, settings.table.ego, settings.table.dt)
+    lead, least_cos = leading_speed(me, settings.table.rules), least_cosine(settings.table.rules)
     half_lengths, half_widths = me.half_length + _HALF_DIAGONAL, me.half_width + _HALF_DIAGONAL
     nearest = np.inf
-    look = look_ahead_of(me, settings.ego, settings.other, settings.rules, settings.dt)
+    look = look_ahead_of(me, settings.table)
     for i in range(episode.cars - 1):
         k = car_of(i, episode)
         car, pose = cars[k], now[k]
@@ -258,9 +258,7 @@ def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings
             share,
             lead,
             least_cos,
-            settings.ego,
-            settings.other,
-            settings.dt,
+            settings.table,
         )
         closing = ego.speed - slowed(car.speed, slant, pose.wreck, least_cos)
         gap_lon, gap_lat = along - half_lengths - _ROUNDING, abs(across) - half_widths

@@ -27,9 +27,11 @@ from rss_shield.envs.roads.network import (
 )
 from rss_shield.envs.roads.ways import CAR_ON_ROAD
 from rss_shield.shield._numba.compiled import inner
+from rss_shield.shield.geometry import PIECE_FIELDS
 from rss_shield.shield.junctions.controller import SAMPLE
 from rss_shield.shield.junctions.plans import THREAT
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.risk import MARKING, SOURCE
 
 _WAYS = 8  # ways of one road user that there is room for
 MOMENTS = 11  # at which a regulated road looks ahead
@@ -64,6 +66,11 @@ class Sight(NamedTuple):
     box: np.ndarray  # `[6]` swept box of an obstacle
     users: np.ndarray  # `[N]` ROAD_USER, what it measures elsewhere
     users_before: np.ndarray  # `[N]` ROAD_USER, the same on the frame before
+    measured: np.ndarray  # `[N]` ROAD_USER, what the measure of risk measures
+    sources: np.ndarray  # `[N]` SOURCE of its field
+    lines: np.ndarray  # `[2]` MARKING
+    around: np.ndarray  # `[6]` the nearest of the others
+    straight: np.ndarray  # `[1, 11]` a road of one piece
 
 
 def make_sight(n_lanes, n, speeds, lanes, times):
@@ -95,6 +102,11 @@ def make_sight(n_lanes, n, speeds, lanes, times):
         np.zeros(6),
         np.zeros(n, ROAD_USER),
         np.zeros(n, ROAD_USER),
+        np.zeros(n, ROAD_USER),
+        np.zeros(n, SOURCE),
+        np.zeros(2, MARKING),
+        np.zeros(6, np.int64),
+        np.zeros((1, PIECE_FIELDS)),
     )
 
 

@@ -7,7 +7,7 @@ structured arrays are arrays: `cars["x"]` is `[E, N]`.
 import numpy as np
 
 from rss_shield.envs.fast.draws import GENERATOR
-from rss_shield.shield.comfort import Comfort
+from rss_shield.shield.tally import DECISION_FIELDS, EPISODE_FIELDS
 
 # kinds of road users
 TRAFFIC = 0  # `IDMVehicle`
@@ -78,26 +78,9 @@ EPISODE = np.dtype(
         ("near", "i8"),  # how many others it measured then
         ("nominal_acceleration", "f8"),  # last command given from outside
         ("nominal_steering", "f8"),
-        ("frames", "i8"),  # watched since reset
-        ("frames_overridden", "i8"),
-        ("frames_anticipated", "i8"),
-        ("frames_limited", "i8"),
-        ("acceleration_changed", "f8"),  # sums of the sizes of changes [m/s^2]
-        ("steering_changed", "f8"),  # [rad]
+        *EPISODE_FIELDS,
         ("room_left", "f8"),  # beside who was alongside on the last frame [m]
         ("room_right", "f8"),
-        ("dangerous_pairs", "i8"),
-        ("broken_duties", "i8"),
-        ("cost", "f8"),
-        ("min_ttc", "f8"),  # [s]
-        ("blame", "i8"),  # 0 before a contact, then 1 + index into `shield.lanes.judge.VERDICTS`
-        ("blame_partner", "i8"),
-        ("blame_axes", "i8"),
-        ("blame_frames", "i8"),  # from the danger threshold to the contact
-        ("ego_duty", "i8"),
-        ("other_duty", "i8"),
-        ("ego_excess", "f8"),
-        ("other_excess", "f8"),
     ],
     align=True,
 )
@@ -113,42 +96,7 @@ STEP = np.dtype(
         *[(f"reward_{k}", "f8") for k in range(REWARDS)],
         ("raw_reward", "f8"),
         # what the shield saw and did
-        ("frames", "i8"),
-        ("overridden", "i8"),
-        ("anticipated", "i8"),
-        ("limited", "i8"),
-        ("dangerous_pairs", "i8"),
-        ("broken_duties", "i8"),
-        ("acceleration", "f8"),  # sums of what was executed [m/s^2]
-        ("steering", "f8"),  # [rad]
-        ("acceleration_change", "f8"),  # largest
-        ("steering_change", "f8"),
-        ("acceleration_changed", "f8"),  # sums
-        ("steering_changed", "f8"),
-        ("lane_change_refused", "?"),
-        ("margin_lon", "f8"),
-        ("margin_lat", "f8"),
-        ("partner", "i8"),
-        ("response", "i8"),
-        ("cost", "f8"),
-        ("override_share", "f8"),
-        ("anticipation_share", "f8"),
-        ("limited_share", "f8"),
-        ("mean_acceleration_change", "f8"),
-        ("mean_steering_change", "f8"),
-        ("comfort", "f8", (len(Comfort._fields),)),
-        ("episode_cost", "f8"),
-        ("episode_dangerous_pairs", "i8"),
-        ("episode_broken_duties", "i8"),
-        ("min_ttc", "f8"),
-        ("blame", "i8"),
-        ("blame_partner", "i8"),
-        ("blame_axes", "i8"),
-        ("blame_frames", "i8"),
-        ("ego_duty", "i8"),
-        ("other_duty", "i8"),
-        ("ego_excess", "f8"),
-        ("other_excess", "f8"),
+        *DECISION_FIELDS,
         ("episode_return", "f8"),
         ("episode_length", "i8"),
     ],

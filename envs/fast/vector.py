@@ -12,9 +12,11 @@ from rss_shield.envs.decisions.executed import executed_actions
 from rss_shield.envs.decisions.replacement import order_of, replace
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
-from rss_shield.envs.fast.infos import info_of, step_infos
+from rss_shield.envs.fast.infos import step_infos
 from rss_shield.envs.fast.recording import Recording
 from rss_shield.envs.options import Settings
+from rss_shield.shield.risk import RiskSettings
+from rss_shield.shield.tally import info_at
 
 _MODES = {
     AutoresetMode.SAME_STEP: SAME_STEP,
@@ -56,6 +58,7 @@ class FastVectorEnv(VectorEnv):
       autoreset_mode: see above.
       threads: threads that share the work. Results do not depend on it.
       replaces: a meta-action whose mask is False is replaced at the start of the decision; see `ShieldWrapper`.
+      risk: settings of the driving safety field that is measured around each ego, too; None = not measured.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
@@ -70,6 +73,7 @@ class FastVectorEnv(VectorEnv):
         threads: int = 1,
         penalty_by_change: bool = False,
         replaces: bool = False,
+        risk: RiskSettings | None = None,
     ) -> None:
         self.scenario = scenario
         self.settings = settings
@@ -80,7 +84,8 @@ class FastVectorEnv(VectorEnv):
         self.action_space = batch_space(scenario.action_space, num_envs)
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
         mode = _MODES[autoreset_mode]
-        self.engine = Engine(scenario, num_envs, settings, intervention_penalty, mode, threads, penalty_by_change)
+        rules = settings, intervention_penalty, mode, threads, penalty_by_change, risk
+        self.engine = Engine(scenario, num_envs, *rules)
         self._order = order_of(scenario.labels) if replaces and settings is not None and settings.overrides else None
         self.recording = Recording(self.engine)
         self._everywhere = np.ones(num_envs, bool)
@@ -101,7 +106,7 @@ class FastVectorEnv(VectorEnv):
         self.recording.begin(restarted)
         self._began[restarted] = perf_counter()
         self._decided = np.zeros(self.num_envs, bool)
-        self._infos = self._told(outputs.steps, self._decided)
+        self._infos = self._told(outputs.steps, outputs.risks, self._decided)
         return self._shaped(outputs.observations), _marked(self._infos, restarted, self._decided)
 
     def step(self, actions):
@@ -125,7 +130,7 @@ class FastVectorEnv(VectorEnv):
         self.recording.advance(ended, began if next_step else None, same_step)
 
         self._decided = ~ended if same_step else ~began if next_step else self._everywhere
-        self._infos = self._told(outputs.steps, self._decided, actions, proposed)
+        self._infos = self._told(outputs.steps, outputs.risks, self._decided, actions, proposed)
         infos = _marked(self._infos, self._everywhere, self._decided)
         if ended.any():
             if same_step:
@@ -154,14 +159,14 @@ class FastVectorEnv(VectorEnv):
 
     def info(self, e: int) -> dict:
         """The last infos of one environment as a plain dictionary."""
-        info = info_of(self._infos, e)
+        info = info_at(self._infos, e)
         return info if self._decided[e] else _without(info, _OF_DECISIONS)
 
     def close_extras(self, **kwargs) -> None:
         self.engine.close()
 
     def _finals(self, outputs: Outputs, ended, actions, proposed) -> dict:
-        finals = self._told(outputs.final_steps, ended, actions, proposed)
+        finals = self._told(outputs.final_steps, outputs.final_risks, ended, actions, proposed)
         finals["episode"] = self._episode(outputs.final_steps)
         return {
             "final_obs": self._shaped(outputs.final_observations),
@@ -170,9 +175,9 @@ class FastVectorEnv(VectorEnv):
             "_final_info": ended,
         }
 
-    def _told(self, steps, decided, actions=None, proposed=None) -> dict:
+    def _told(self, steps, risks, decided, actions=None, proposed=None) -> dict:
         """Infos, with the actions where one was decided upon."""
-        infos = step_infos(steps, self.scenario, self.settings)
+        infos = step_infos(steps, self.scenario, self.settings, risks)
         if actions is None:
             actions = proposed = np.zeros(self.action_space.shape, self.action_space.dtype)
         infos["action"] = _where(decided, actions)

@@ -43,7 +43,7 @@ class TurnTaker(JunctionEgo):
     def _restrict(
         self, scene: Scene, acceleration: float, steering: float, holds: bool = False
     ) -> tuple[JunctionReport, float]:
-        self.waited += self.settings.dt * self.needs_gap
+        self.waited += self.settings.table.dt * self.needs_gap
         report, steering = super()._restrict(scene, acceleration, steering, holds)
         self.trapped, self.is_held_back = report.trapped, report.response == RESPONSE_BRAKE
         return report, steering
@@ -82,7 +82,11 @@ class TurnTaker(JunctionEgo):
 
     def _is_behind(self, paths, track: Track, front: Track) -> bool:
         settings = self.settings
-        return bool(is_follower(Scene(paths, front, self.room, settings.other, settings.ego, settings.dt), track, True))
+        return bool(
+            is_follower(
+                Scene(paths, front, self.room, settings.table.other, settings.table.ego, settings.table.dt), track, True
+            )
+        )
 
     def progress(self) -> float:
         """How far it has come on its path [m]."""
@@ -127,7 +131,7 @@ class CompliantDriver(TurnTaker):
     def _leaves_gap(self, track: Track) -> bool:
         """Does it wait far back for an agent that needs a gap? Only if it can do so without hurry."""
         room = self.to_junction - GAP
-        if not self.holds and room < 2.0 * stopping_distance(track.v, self.settings.ego.a_min_brake) + 1.0:
+        if not self.holds and room < 2.0 * stopping_distance(track.v, self.settings.table.ego.a_min_brake) + 1.0:
             return False
         return any(
             other is not None and other.turn < self.turn and other.needs_gap for other in map(shield_of, self.others)
@@ -147,4 +151,4 @@ def take_turns(road: Any) -> None:
 def shield_of(vehicle: Any) -> TurnTaker | None:
     """The shield on a vehicle that takes its turn, until it has a contact."""
     shield = getattr(vars(vehicle).get("act"), "__self__", None)
-    return shield if isinstance(shield, TurnTaker) and shield.contact is None else None
+    return shield if isinstance(shield, TurnTaker) and not shield.has_contact else None

@@ -55,7 +55,7 @@ def shield_everybody(road: Any, settings: Settings) -> None:
     duties = settings._replace(overrides=True, entry=PRIORITY)
     there = [v for v in road.vehicles if isinstance(v, ControlledVehicle) and v.collidable]
     shields = [shield_on(v) for v in there]
-    stay = [driver for driver in drivers_on(road) if driver.contact or any(driver is one for one in shields)]
+    stay = [driver for driver in drivers_on(road) if driver.has_contact or any(driver is one for one in shields)]
     unshielded = [v for v, shield in zip(there, shields, strict=True) if shield is None]
     if settings.scheme == LANES:
         road.drivers = stay + [attach(vehicle, duties) for vehicle in unshielded]

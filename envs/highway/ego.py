@@ -7,12 +7,11 @@ import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
 from highway_env.vehicle.objects import Landmark
 
-from rss_shield.envs.options import LANES, Settings
+from rss_shield.envs.options import LANES, PLANS, Settings
 from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, road_through, tightest
 from rss_shield.envs.roads.steering import MAX_SLIP
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
-from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
 from rss_shield.shield.lanes.controller import (
@@ -23,22 +22,24 @@ from rss_shield.shield.lanes.controller import (
 )
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
-from rss_shield.shield.lanes.judge import DUTIES, VERDICTS, Log, Verdict, judge_contact, judge_frame
+from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
-
-# of a car that had its contact before there was a shield on it
-EARLIER_CONTACT = {
-    "verdict": "inherited",
-    "partner": -1,
-    "danger": "inherited",
-    "seconds_since_threshold": 0.0,
-    "ego_duty": "",
-    "ego_excess": 0.0,
-    "other_duty": "",
-    "other_excess": 0.0,
-}
+from rss_shield.shield.tally import (
+    COUNTED,
+    DECISION_FIELDS,
+    EPISODE_FIELDS,
+    count_change,
+    count_frame,
+    enter_contact,
+    evidence,
+    info_at,
+    note_executed,
+    start_decision,
+    start_episode,
+)
+from rss_shield.shield.verdicts import INHERITED, KEPT, VERDICTS, Verdict, weight_of
 
 
 class Frame(NamedTuple):
@@ -54,6 +55,19 @@ class Frame(NamedTuple):
     jumped: tuple[bool, ...] = ()  # `[N]` a user was moved in the lane frame, or with it
     ego_before: np.ndarray | None = None  # `ROAD_USER` on the frame before, in the lane frame of this one
     users_before: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` likewise
+
+
+class Look(NamedTuple):
+    """What a shield made of the last frame, for whoever films the episode."""
+
+    wish: Command  # of the ego's own controller
+    command: Command  # that was executed
+    overridden: bool
+    anticipated: bool
+    limited: bool
+    response: int  # sum of RESPONSE_*
+    partner: int  # index among `ShieldedEgo.others` of who is nearest to danger, or in the way; -1 = nobody
+    dangerous: bool
 
 
 def log_of(frames: list[Frame]) -> Log:
@@ -81,19 +95,8 @@ def log_of(frames: list[Frame]) -> Log:
 # ---------------------------------------------------------------- one ego under the shield
 
 
-class StepTally:
-    """What happened in one decision step, frame by frame."""
-
-    def __init__(self) -> None:
-        self.frames = self.overridden = self.anticipated = self.limited = 0
-        self.dangerous_pairs = self.broken_duties = 0
-        self.acceleration = self.steering = 0.0  # sums of what was executed
-        self.acceleration_change = self.steering_change = 0.0  # largest
-        self.acceleration_changed = self.steering_changed = 0.0  # sums over the frames
-        self.lane_change_refused = False
-        self.margin_lon = self.margin_lat = float("inf")
-        self.partner = -1
-        self.response = 0
+# what is counted of one ego, see `shield.tally`
+DECISION, EPISODE = np.dtype(DECISION_FIELDS, align=True), np.dtype(EPISODE_FIELDS, align=True)
 
 
 class ShieldedEgo:
@@ -127,16 +130,13 @@ class ShieldedEgo:
         self.road = np.zeros((0, PIECE_FIELDS))  # that the ego is measured along
         self.branches = self.road  # and everybody else
         self.jumped = np.zeros(0, bool)
-        self.contact: dict | None = None
-        self.frames = self.frames_overridden = self.frames_anticipated = self.frames_limited = 0
-        self.acceleration_changed = self.steering_changed = 0.0
         self.rooms = (float("inf"), float("inf"))  # to the left and to the right, beside who is alongside [m]
         self.ride = np.zeros(1, RIDE)[0]
-        self.dangerous_pairs = self.broken_duties = 0
-        self.cost = 0.0
-        self.min_ttc = float("inf")
-        self.tally = StepTally()
+        self.tally, self.since = np.zeros(1, DECISION)[0], np.zeros(1, EPISODE)[0]  # this decision, and since reset
+        start_decision(self.tally)
+        start_episode(self.since)
         self.record: list[Frame] | None = [] if record else None
+        self.look: Look | None = None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
         self.measured: Any = None  # `EgoMeter` likewise
         self.judge = self  # or another, which watches by a table of its own
@@ -145,9 +145,8 @@ class ShieldedEgo:
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
         """Take the place of another car: what counts since reset goes on."""
-        self.frames, self.frames_overridden = former.frames, former.frames_overridden
-        self.dangerous_pairs, self.broken_duties = former.dangerous_pairs, former.broken_duties
-        self.cost, self.min_ttc = former.cost, former.min_ttc
+        for name in COUNTED:
+            self.since[name] = former.since[name]
         if self.judge is not self:
             self.judge.go_on_from(former.judge)
 
@@ -184,17 +183,14 @@ class ShieldedEgo:
         self._meet()
         users, ego, bend = self._sense()
         wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
-        rules = settings.ego, settings.other, settings.rules, settings.dt
-        danger = find_danger(ego, users, *self.last, self.memory, *rules)
+        danger = find_danger(ego, users, *self.last, self.memory, settings.table)
         self.rooms = danger.room_left, danger.room_right
         response = Response(wish, False, False, False)
         if settings.overrides:
             body = Body(*self.body, bend.curvature, bend.slack, self.backs_up)
             response = self._respond(wish, danger, ego, users, body)
         command = response.command
-        pairs, broken = judge_frame(
-            ego, users, self.memory, command, bend.curvature, settings.ego, settings.other, settings.dt
-        )
+        pairs, broken = judge_frame(ego, users, self.memory, command, bend.curvature, settings.table)
         steered = steering
         if command != wish:
             if command.slip != wish.slip:
@@ -203,67 +199,38 @@ class ShieldedEgo:
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
         before, self.last = self.last, (ego, users)
-        changes = command.acceleration - wish.acceleration, steered - steering
-        self._note_executed(command.acceleration, steered)
-        self._count(danger, response, response.anticipated, pairs, broken, *changes)
-        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.dt)
+        count_change(
+            self.tally, self.since, abs(command.acceleration - wish.acceleration), abs(float(steered - steering))
+        )
+        note_executed(self.tally, command.acceleration, steered)
+        self.look = Look(wish, command, *response[1:], danger.response, danger.partner, pairs > 0)
+        self._count(danger, response, pairs, broken)
+        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], gap_ahead(ego, users, self.boxes), settings.table.dt)
         tally = self.tally
-        if max(danger.margin_lon, danger.margin_lat) < max(tally.margin_lon, tally.margin_lat):
-            tally.margin_lon, tally.margin_lat = danger.margin_lon, danger.margin_lat
-            tally.partner = self._index_on_road(danger.partner)
+        if max(danger.margin_lon, danger.margin_lat) < max(tally["margin_lon"], tally["margin_lat"]):
+            tally["margin_lon"], tally["margin_lat"] = danger.margin_lon, danger.margin_lat
+            tally["partner"] = self._index_on_road(danger.partner)
         if self.record is not None:
             seen = ego, users, bend.curvature, tuple(self.jumped), *before
             self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
 
     def _respond(self, wish: Command, danger, ego, users, body: Body) -> Response:
         """What the filter in force makes of a command."""
-        settings = self.settings
+        settings, table = self.settings, self.settings.table
         if settings.filter.kind != RSS:
-            rules = settings.ego, settings.other, settings.rules, settings.dt
             traffic = Traffic(ego, users, self.memory, self._offset_from_target(), None)
-            state = self.answers, self.tally.frames == 0
-            response, self.answers = answer(settings.filter, wish, traffic, danger.free, *state, body, *rules)
+            state = self.answers, bool(self.tally["frames"] == 0)
+            response, self.answers = answer(settings.filter, wish, traffic, danger.free, *state, body, table)
             return response
-        response = respond(self._taken_back(wish, ego, body), danger, ego, body, settings.rules, settings.dt)
+        response = respond(self._taken_back(wish, ego, body), danger, ego, body, table.rules, table.dt)
         if settings.correction == RESPONSE:
-            response = in_full(response, danger, ego, body, settings.rules, settings.dt)
+            response = in_full(response, danger, ego, body, table.rules, table.dt)
         return response
 
-    def _note_executed(self, acceleration: float, steering: float) -> None:
-        self.tally.acceleration += acceleration
-        self.tally.steering += steering
-
-    def _count(
-        self,
-        danger,
-        response,
-        anticipated: bool,
-        pairs: int,
-        broken: int,
-        acceleration_change: float,
-        steering_change: float,
-    ) -> None:
-        tally, overrides = self.tally, self.settings.overrides
-        tally.frames += 1
-        tally.overridden += response.overridden and overrides
-        tally.anticipated += anticipated and overrides
-        tally.limited += response.limited and overrides
-        tally.dangerous_pairs += pairs
-        tally.broken_duties += broken
-        tally.acceleration_change = max(tally.acceleration_change, abs(acceleration_change))
-        tally.steering_change = max(tally.steering_change, abs(float(steering_change)))
-        tally.acceleration_changed += abs(acceleration_change)
-        tally.steering_changed += abs(float(steering_change))
-        tally.response |= danger.response
-        self.frames += 1
-        self.frames_overridden += response.overridden and overrides
-        self.frames_anticipated += anticipated and overrides
-        self.frames_limited += response.limited and overrides
-        self.acceleration_changed += abs(acceleration_change)
-        self.steering_changed += abs(float(steering_change))
-        self.dangerous_pairs += pairs
-        self.broken_duties += broken
-        self.min_ttc = min(self.min_ttc, danger.ttc)
+    def _count(self, danger, response, pairs: int, broken: int) -> None:
+        on = self.settings.overrides
+        what = response.overridden and on, response.anticipated and on, response.limited and on
+        count_frame(self.tally, self.since, *what, pairs, broken, danger.response, danger.ttc)
 
     def _index_on_road(self, i: int) -> int:
         """Index in `road.vehicles`; static objects follow after the vehicles."""
@@ -275,20 +242,20 @@ class ShieldedEgo:
 
     @property
     def _takes_back(self) -> bool:
-        return self.settings.overrides and self.settings.rules.take_back and self.settings.scheme == LANES
+        return self.settings.overrides and self.settings.table.rules.take_back and self.settings.scheme == LANES
 
     def _refuse_lane_change(self, before) -> None:
         """Ignore the lane change that the agent asks for, if it is blocked or comes half-way through another."""
         vehicle = self.vehicle
-        if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.contact is not None:
+        if not self._takes_back or not isinstance(vehicle, MDPVehicle) or self.has_contact:
             return
         if self.is_refused(before, vehicle.target_lane_index):
             vehicle.target_lane_index = before
-            self.tally.lane_change_refused = True
+            self.tally["lane_change_refused"] = True
 
     def is_refused(self, before, target) -> bool:
         """Is a change from one lane to another blocked, or does it come half-way through another?"""
-        if not self.settings.rules.take_back or target == before or target[:2] != before[:2]:
+        if not self.settings.table.rules.take_back or target == before or target[:2] != before[:2]:
             return False
         back = turns_back(self._offset(self.vehicle.lane_index), self._offset(before), target[2] - before[2])
         return bool(back or self._is_blocked(target))
@@ -313,15 +280,17 @@ class ShieldedEgo:
             return wish
         if not isinstance(vehicle, ControlledVehicle):
             width = vehicle.lane.width_at(0.0)
-            slip = lead_back(wish.slip, ego, width, *self.rooms, body.half_wheelbase, body.curvature, self.settings.dt)
+            slip = lead_back(
+                wish.slip, ego, width, *self.rooms, body.half_wheelbase, body.curvature, self.settings.table.dt
+            )
             if slip != wish.slip:
-                self.tally.lane_change_refused = True
+                self.tally["lane_change_refused"] = True
             return Command(wish.acceleration, float(slip))
         if isinstance(vehicle, MDPVehicle):
             target = self._reachable(vehicle.lane_index, vehicle.target_lane_index)
             if target != vehicle.target_lane_index:
                 vehicle.target_lane_index = target
-                self.tally.lane_change_refused = True
+                self.tally["lane_change_refused"] = True
         return wish
 
     def _reachable(self, here, target):
@@ -349,7 +318,7 @@ class ShieldedEgo:
         self._choose_frame()
         users, ego = self._measure(self.poses, self.before)
         self._go_around(users, ego)
-        (x, y, _, speed), dt = self.poses[-1], self.settings.dt
+        (x, y, _, speed), dt = self.poses[-1], self.settings.table.dt
         bend = look_ahead(self.road, x, y, speed, self.body[0], dt)
         self.poses_before, self.earlier, self.before = self.poses, self.before, self.poses[:, :2]
         return users, ego, Bend(*bend)
@@ -359,7 +328,7 @@ class ShieldedEgo:
         out = np.zeros(len(poses), ROAD_USER)
         out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in self.others]
         out["in_own_lane"] = [self._in_own_lane(v) for v in [*self.others, self.vehicle]]
-        dt = self.settings.dt
+        dt = self.settings.table.dt
         to_lane_frame_all(self.branches, poses[:-1], before[:-1], self.boxes[:-1], dt, out[:-1])
         to_lane_frame_all(self.road, poses[-1:], before[-1:], self.boxes[-1:], dt, out[-1:])
         return out[:-1], out[-1]
@@ -371,7 +340,6 @@ class ShieldedEgo:
         in again from there.
         """
         settings = self.settings
-        rules = settings.ego, settings.other, settings.rules, settings.dt
         ego_before, users_before = self.last[0], self.last[1].copy()
         for i in np.flatnonzero(np.isfinite(users["around"])):
             around = users["around"][i]
@@ -383,7 +351,7 @@ class ShieldedEgo:
             if self.memory["since"][i] == 0:
                 margins = []
                 for users["s"][i] in places:
-                    margins.append(assess(ego, users[i], *rules).margin_lon)
+                    margins.append(assess(ego, users[i], settings.table).margin_lon)
                 place = int(np.argmin(margins))
             users["s"][i] = places[place]
             if place != follows and known:
@@ -424,7 +392,7 @@ class ShieldedEgo:
         self.others, self.memory, self.keys = others, memory, keys
         self.poses_before, self.before, self.earlier = poses, before, earlier
         self.last = (self.last[0], last)
-        bound, bend = self.settings.rules.heading_bound, tightest(self.vehicle.road.network)
+        bound, bend = self.settings.table.rules.heading_bound, tightest(self.vehicle.road.network)
         self.boxes = np.array([_box(v, bound, bend) for v in [*others, self.vehicle]])
 
     def _choose_frame(self) -> None:
@@ -458,7 +426,7 @@ class ShieldedEgo:
     def _roads_along(self, heading: Heading):
         """The road that the ego is measured along, and the one with the branches that it may still take."""
         settings, network = self.settings, self.vehicle.road.network
-        reach = reach_of(settings.ego, settings.other, settings.dt)
+        reach = reach_of(settings.table.ego, settings.table.other, settings.table.dt)
         road = road_through(network, heading.lane, reach, heading.way)
         return road, road_through(network, heading.lane, reach, *heading[1:]) if heading.beside else road
 
@@ -472,50 +440,55 @@ class ShieldedEgo:
 
     # -- contacts
 
+    @property
+    def has_contact(self) -> bool:
+        return bool(self.since["blame"])
+
+    @property
+    def blame(self) -> str:
+        """The verdict of the ego's contact, "" before one."""
+        return VERDICTS[self.since["blame"] - 1] if self.has_contact else ""
+
+    @property
+    def contact(self) -> dict[str, Any] | None:
+        """The contact of the ego: verdict, partner (index on the road), kind of danger, duties broken."""
+        return info_at(evidence(np.array([self.since]), self.settings.table.dt), 0) if self.has_contact else None
+
+    def had_contact_before(self) -> None:
+        """The vehicle had its contact before there was a shield on it."""
+        nobody = Verdict(INHERITED, 0, 0, KEPT, 0.0, KEPT, 0.0)
+        enter_contact(self.since, nobody, -1, False)
+
     def check_contact(self) -> bool:
         """Has the ego touched somebody, or does highway-env predict it for the next frame?
 
         Judged at the first such sample, before the impact displaces anybody.
         """
         vehicle = self.vehicle
-        if self.contact is None and (vehicle.crashed or vehicle.impact is not None):
-            self.contact = self._judge_contact()
+        if not self.has_contact and (vehicle.crashed or vehicle.impact is not None):
+            self._judge_contact()
             if self.judge is not self:
                 self.judge.check_contact()
-        return self.contact is not None
+        return self.has_contact
 
-    def _judge_contact(self) -> dict | None:
+    def _judge_contact(self) -> None:
         self._meet()
         if not self.others:  # the flag was not raised by a contact
-            return None
+            return
         touching = [i for i, other in enumerate(self.others) if self._touches(other)]
         if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
-        verdicts = self._verdicts(touching)
         # several at once: the one that weighs most against the ego counts
-        weight = {"none": 4, "ego": 3, "both": 2, "other": 1, "inherited": 0}
-        i, verdict = max(zip(touching, verdicts, strict=True), key=lambda pair: weight[VERDICTS[pair[1].verdict]])
-        return {
-            "verdict": VERDICTS[verdict.verdict],
-            "partner": self._index_on_road(i),
-            "danger": self._danger(i, int(verdict.axes)),
-            "seconds_since_threshold": verdict.frames * self.settings.dt,
-            "ego_duty": DUTIES[verdict.ego_duty],
-            "ego_excess": float(verdict.ego_excess),
-            "other_duty": DUTIES[verdict.other_duty],
-            "other_excess": float(verdict.other_excess),
-        }
+        pairs = zip(touching, self._verdicts(touching), strict=True)
+        i, verdict = max(pairs, key=lambda pair: weight_of(pair[1].verdict))
+        enter_contact(self.since, verdict, self._index_on_road(i), self.settings.scheme == PLANS)
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:
         settings, memory = self.settings, self.memory
-        rules = settings.ego, settings.other, settings.rules, settings.dt
         users, ego, _ = self._sense()
         for i in touching:
-            catch_up(memory[i], self.last[0], self.last[1][i], *rules)
-        return [judge_contact(ego, users[i], memory[i], *rules) for i in touching]
-
-    def _danger(self, i: int, kind: int) -> str:
-        return AXES[kind]
+            catch_up(memory[i], self.last[0], self.last[1][i], settings.table)
+        return [judge_contact(ego, users[i], memory[i], settings.table) for i in touching]
 
     def _touches(self, other) -> bool:
         """highway-env's own collision test, in its own order, without its effects."""
@@ -526,7 +499,7 @@ class ShieldedEgo:
             first, second = other, vehicle
         if not (first.check_collisions or second.check_collisions):
             return False
-        touching, will_touch, _ = first._is_colliding(second, self.settings.dt)
+        touching, will_touch, _ = first._is_colliding(second, self.settings.table.dt)
         return bool(touching or will_touch)
 
 

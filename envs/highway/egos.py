@@ -7,11 +7,11 @@ import gymnasium as gym
 
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
-from rss_shield.envs.highway.ego import EARLIER_CONTACT, ShieldedEgo
+from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.measured import EgoMeter
-from rss_shield.envs.highway.risk import RiskMeter, check_risk
+from rss_shield.envs.highway.risk import RiskMeter
 from rss_shield.envs.highway.step import attach, shield_on
-from rss_shield.envs.options import Options, Settings, check_mode, settings_for
+from rss_shield.envs.options import Options, Settings, check_mode, check_risk, settings_for
 from rss_shield.shield.filters.answer import RSS, Filter
 from rss_shield.shield.lanes.correction import NEAREST
 
@@ -85,7 +85,7 @@ class EgoShields(gym.Wrapper):
         """
         self._check()
         env: Any = self.env.unwrapped
-        if self._settings.dt != 1 / env.config["simulation_frequency"]:
+        if self._settings.table.dt != 1 / env.config["simulation_frequency"]:
             self._settings, self._judge = self._current_settings(), self._judge_settings()
         self._egos = [self._shield_of(i, vehicle) for i, vehicle in enumerate(env.controlled_vehicles)]
         for shield in list(egos_on(env)):
@@ -111,7 +111,8 @@ class EgoShields(gym.Wrapper):
             shield.meter = RiskMeter(self.risk) if self.risk is not None else None
             shield.measured = EgoMeter(shield) if self.options.measures else None
             if vehicle.crashed:
-                shield.contact = shield.judge.contact = dict(EARLIER_CONTACT)
+                shield.had_contact_before()
+                shield.judge.had_contact_before()
             if env.time > 0.0 and i < len(self._egos):
                 shield.go_on_from(self._egos[i])
         elif shield.settings != self._settings:

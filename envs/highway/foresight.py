@@ -40,7 +40,7 @@ def action_mask(ego: ShieldedEgo, env: Any) -> np.ndarray:
     if not isinstance(kind, DiscreteMetaAction):
         raise ValueError(f"action_masks: expected DiscreteMetaAction, not {type(kind).__name__}")
     mask = np.ones(len(kind.actions), bool)
-    if ego.contact is not None or ego.vehicle.crashed or ego.vehicle.impact is not None:
+    if ego.has_contact or ego.vehicle.crashed or ego.vehicle.impact is not None:
         return mask
     frames = int(env.config["simulation_frequency"] // env.config["policy_frequency"])
     names = [kind.actions[a] for a in range(len(mask))]
@@ -64,7 +64,6 @@ def _on_lanes(ego: ShieldedEgo, names: list[str], frames: int) -> np.ndarray:
         users, me, bend = ego._sense()
         seen, stage = Seen(me, users, *ego.last, ego.memory), make_stage(len(users))
         body = Body(*ego.body, bend.curvature, bend.slack, False)
-        rules = settings.ego, settings.other, settings.rules, settings.dt
         for a, name in enumerate(names):
             with _as_if(vehicle, name):
                 target = vehicle.target_lane_index
@@ -74,7 +73,7 @@ def _on_lanes(ego: ShieldedEgo, names: list[str], frames: int) -> np.ndarray:
                     ahead = lane.heading_at(s + vehicle.speed * PURSUIT)
                     turn = ahead - (vehicle.heading - me["heading"])
                     aim = Aim(float(vehicle.target_speed), float(offset), float(turn))
-                    first[a] = first_response(seen, stage, aim, body, frames, *rules)
+                    first[a] = first_response(seen, stage, aim, body, frames, settings.table)
     return first
 
 

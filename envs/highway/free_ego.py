@@ -21,7 +21,7 @@ from rss_shield.shield._numba.compiled import compiled
 from rss_shield.shield.junctions.conflict_areas import cell_of, reach_beyond
 from rss_shield.shield.junctions.controller import JunctionReport
 from rss_shield.shield.junctions.plans import Scene, throttle
-from rss_shield.shield.lanes.judge import KEPT, LEFT_PATHS
+from rss_shield.shield.verdicts import KEPT, LEFT_PATHS
 
 ROOM = 0.75  # to either side of what highway-env's drivers sweep [m]
 DRIFT = 0.3  # how exactly such a car follows a plan [m]

@@ -3,7 +3,7 @@
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
-from rss_shield.envs.highway.ego import Frame, ShieldedEgo
+from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.paths import Size, size_of
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, drift_of, is_outside, junction_of, list_threats, track_of
@@ -24,8 +24,9 @@ from rss_shield.shield.junctions.controller import (
     junction_frame,
 )
 from rss_shield.shield.junctions.held_back import held_by
-from rss_shield.shield.junctions.plans import NEVER, PLAN_NAMES, THREAT, Scene
-from rss_shield.shield.lanes.judge import Verdict
+from rss_shield.shield.junctions.plans import NEVER, THREAT, Scene, Track
+from rss_shield.shield.tally import count_change, note_executed
+from rss_shield.shield.verdicts import Verdict
 
 
 class JunctionEgo(ShieldedEgo):
@@ -45,6 +46,8 @@ class JunctionEgo(ShieldedEgo):
         self.size_numbers: list[int] = []  # `[N]` index into the junction's sizes
         self.box = np.zeros(6)
         self.path = -1
+        self.track: Track | None = None  # of the last frame, ...
+        self.ways = 0  # ... and how many of `room` the others might take on it
         self.refused = False  # the lane change of this decision
         self.frames_trapped = 0
         self.pairs_examined = self.pairs_possible = 0  # pair-frames: plans were checked against somebody, could be
@@ -52,7 +55,7 @@ class JunctionEgo(ShieldedEgo):
         self.judging = False  # a contact: who had crashed is read off the frame before
 
     def _take_sizes(self, sizes: tuple[Size, ...]) -> None:
-        self.junction = junction_of(self.vehicle.road.network, self.clearance, self.settings.dt, sizes)
+        self.junction = junction_of(self.vehicle.road.network, self.clearance, self.settings.table.dt, sizes)
 
     def _frame(self) -> None:
         vehicle, settings = self.vehicle, self.settings
@@ -63,25 +66,30 @@ class JunctionEgo(ShieldedEgo):
         scene = self._scene()
         report, steered = self._restrict(scene, acceleration, steering)
         granted = report.acceleration if settings.overrides else acceleration
+        self.track, self.ways = scene.track, len(scene.threats)
         if settings.overrides:
             vehicle.action = {"steering": steered, "acceleration": granted}
-        self._note_executed(granted, steered)
-        if settings.overrides and report.overridden and self.tally.partner < 0:
+        note_executed(self.tally, granted, steered)
+        if settings.overrides and report.overridden and self.tally["partner"] < 0:
             held = int(held_by(scene, acceleration, len(self.others), not settings.waits_anywhere))
-            self.tally.partner = self._index_on_road(held) if held >= 0 else -1
+            self.tally["partner"] = self._index_on_road(held) if held >= 0 else -1
         if self.refused:
             report = report._replace(overridden=True, limited=False)
             self.refused = False
-            self.tally.lane_change_refused = True
+            self.tally["lane_change_refused"] = True
         self.frames_trapped += report.trapped
         self.pairs_examined += report.examined
         self.pairs_possible += report.possible
-        self._count(
-            report, report, report.anticipated, report.pairs, report.broken, granted - acceleration, steered - steering
+        count_change(self.tally, self.since, abs(granted - acceleration), abs(float(steered - steering)))
+        self._count(report, report, report.pairs, report.broken)
+        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.table.dt)
+        wish, command = (
+            Command(a, float(np.arctan(0.5 * np.tan(angle))))
+            for a, angle in ((acceleration, steering), (granted, steered))
         )
-        ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.dt)
+        changed = report.overridden and settings.overrides, report.anticipated, report.limited and settings.overrides
+        self.look = Look(wish, command, *changed, report.response, -1, report.pairs > 0)
         if self.record is not None:
-            command = Command(granted, float(np.arctan(0.5 * np.tan(steered))))
             self.record.append(Frame(tuple(self.keys), self.poses, command))
 
     def _scene(self) -> Scene:
@@ -94,7 +102,7 @@ class JunctionEgo(ShieldedEgo):
 
     def _scene_of(self, track, threats, roads) -> Scene:
         settings, drift = self.settings, drift_of(roads, self.cars[-1], track)
-        return Scene(roads.paths, track, threats, settings.ego, settings.other, settings.dt, drift)
+        return Scene(roads.paths, track, threats, settings.table.ego, settings.table.other, settings.table.dt, drift)
 
     def _restrict(
         self, scene: Scene, acceleration: float, steering: float, holds: bool = False
@@ -117,7 +125,7 @@ class JunctionEgo(ShieldedEgo):
             not settings.waits_anywhere,
             settings.examine,
             settings.overrides,
-            settings.rules.anticipation,
+            settings.table.rules.anticipation,
             holds,
         )
         return report, steering
@@ -127,7 +135,7 @@ class JunctionEgo(ShieldedEgo):
         super().act(action)
         if action is not None:
             self.refused = False
-            if self.settings.overrides and self.contact is None:
+            if self.settings.overrides and not self.has_contact:
                 self._gate(before)
 
     def _gate(self, before) -> None:
@@ -164,7 +172,7 @@ class JunctionEgo(ShieldedEgo):
         track = track_of(roads, cars[-1], self.path)
         self.path = track.path
         self.samples = np.zeros(len(self.others), SAMPLE)
-        common = (roads, track, cars[:-1], self.crossings, settings.intent, settings.other.v_cap, self.samples)
+        common = (roads, track, cars[:-1], self.crossings, settings.intent, settings.table.other.v_cap, self.samples)
         count = list_threats(*common, self.room, self.box)
         if count > len(self.room):
             self.room = np.zeros(2 * count, THREAT)
@@ -181,7 +189,7 @@ class JunctionEgo(ShieldedEgo):
         approach, distance = road.approach_of(vehicle), road.distance_to_line(vehicle)
         if approach < 0:
             return threats
-        ahead = road.signal(approach), distance, max(vehicle.speed, 0.0), self.settings.ego
+        ahead = road.signal(approach), distance, max(vehicle.speed, 0.0), self.settings.table.ego
         if self.may_pass is None:
             self.may_pass = bool(may_pass(*ahead))
         elif distance > 0.0:
@@ -215,7 +223,7 @@ class JunctionEgo(ShieldedEgo):
             threat["priority"] = 0
         if has_right or road.has_left(other):
             return
-        if left > 0.0 and stopping_distance(other.speed, settings.other.a_min_brake) <= left:
+        if left > 0.0 and stopping_distance(other.speed, settings.table.other.a_min_brake) <= left:
             if settings.entry != CAUTIOUS:
                 threat["line"] = threat["s"] + left
                 threat["red_for"] = road.time_to_green(road.approach_of(other))
@@ -242,12 +250,9 @@ class JunctionEgo(ShieldedEgo):
         self.judging = True
         _, threats, roads = self._look()
         self.judging = False
-        other, dt = self.settings.other, self.settings.dt
+        other, dt = self.settings.table.other, self.settings.table.dt
         outside = [is_outside(roads.paths, threats, i, self.cars[i]) for i in touching]
         return [
             judge_crossing(self.samples[i], self.crossings[i], out, other, dt)
             for i, out in zip(touching, outside, strict=True)
         ]
-
-    def _danger(self, i: int, kind: int) -> str:
-        return PLAN_NAMES[kind]

@@ -6,8 +6,8 @@ import numpy as np
 
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import LANES
-from rss_shield.shield.lanes.judge import KEPT
 from rss_shield.shield.risk.meter import EpisodeMeter
+from rss_shield.shield.verdicts import KEPT
 
 CAUSES = ("ego", "other", "nobody")
 
@@ -20,7 +20,7 @@ class EgoMeter:
     """
 
     def __init__(self, ego: ShieldedEgo) -> None:
-        self.meter = EpisodeMeter(ego.settings.dt, ego.settings.scheme != LANES)
+        self.meter = EpisodeMeter(ego.settings.table.dt, ego.settings.scheme != LANES)
         self.violation = dict.fromkeys(CAUSES, 0.0)
         self.spent, self.frames = 0.0, 0  # by the shield [s]
         self.touched = False
@@ -36,7 +36,7 @@ class EgoMeter:
             ego_broke, other_broke = (judge.memory[name] != KEPT for name in ("ego_broke", "other_broke"))
             for cause, who in (("ego", ego_broke), ("other", other_broke), ("nobody", ~(ego_broke | other_broke))):
                 if (dangerous & who).any():
-                    self.violation[cause] += judge.settings.dt
+                    self.violation[cause] += judge.settings.table.dt
 
     def info(self, ego: ShieldedEgo) -> dict[str, Any]:
         """What infos say since reset; see `ShieldWrapper`."""

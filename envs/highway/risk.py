@@ -3,11 +3,10 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from highway_env.road.lane import LineType
 
 from rss_shield.envs.highway.ego import ShieldedEgo
-from rss_shield.envs.highway.step import LONGEST_TTC
-from rss_shield.envs.options import LANES
+from rss_shield.envs.options import CAR_MASS, LANES
+from rss_shield.envs.roads.lines import line_beside
 from rss_shield.shield.geometry import make_road
 from rss_shield.shield.lanes.frame import to_lane_frame_all
 from rss_shield.shield.lanes.pair import ROAD_USER
@@ -23,8 +22,7 @@ from rss_shield.shield.risk import (
 )
 from rss_shield.shield.risk.field import check_speeds
 from rss_shield.shield.risk.markings import weight_of
-
-CAR = 1500.0  # mass of everybody [kg]: highway-env's vehicles have none
+from rss_shield.shield.tally import LONGEST_TTC
 
 
 class RiskFrame(NamedTuple):
@@ -42,19 +40,6 @@ class RiskFrame(NamedTuple):
     ttc: float  # toward the leader [s]
     thw: float  # [s]
     drac: float  # [m/s^2]
-
-
-def check_risk(risk: Any) -> RiskSettings | None:
-    """Settings of the measure, or None if it is off.
-
-    Raises:
-      ValueError: neither a truth value nor settings in their ranges.
-    """
-    if isinstance(risk, RiskSettings):
-        return RiskSettings.validated(**risk._asdict())
-    if not isinstance(risk, bool):
-        raise ValueError(f"risk = {risk!r}: expected True, False or RiskSettings")
-    return RiskSettings() if risk else None
 
 
 class RiskMeter:
@@ -77,7 +62,7 @@ class RiskMeter:
 
     def look(self, ego: ShieldedEgo) -> None:
         """Take in one frame."""
-        self.dt = ego.settings.dt
+        self.dt = ego.settings.table.dt
         sources = _sources(ego.poses, self.settings)
         along_lanes = ego.settings.scheme == LANES
         body, users = ego.last if along_lanes else _straight_ahead(ego)
@@ -147,7 +132,7 @@ def _sources(poses: np.ndarray, settings: RiskSettings) -> np.ndarray:
     sources = np.zeros(len(poses), SOURCE)
     sources["x"], sources["y"] = poses[:, 0], poses[:, 1]
     sources["vx"], sources["vy"] = poses[:, 3] * np.cos(poses[:, 2]), poses[:, 3] * np.sin(poses[:, 2])
-    sources["mass"], sources["type_factor"], sources["road"] = CAR, 1.0, settings.reference_road
+    sources["mass"], sources["type_factor"], sources["road"] = CAR_MASS, 1.0, settings.reference_road
     return sources
 
 
@@ -156,7 +141,7 @@ def _straight_ahead(ego: ShieldedEgo) -> tuple[np.ndarray, np.ndarray]:
     users = np.zeros(len(ego.poses), ROAD_USER)
     x, y, heading, _ = ego.poses[-1]
     road = make_road([(x, y, heading, 0.0, 1.0, 0.0)])
-    to_lane_frame_all(road, ego.poses, np.full((len(users), 2), np.nan), ego.boxes, ego.settings.dt, users)
+    to_lane_frame_all(road, ego.poses, np.full((len(users), 2), np.nan), ego.boxes, ego.settings.table.dt, users)
     return users[-1], users[:-1]
 
 
@@ -181,20 +166,10 @@ def _lines(vehicle: Any, settings: RiskSettings) -> np.ndarray:
     for k, side in enumerate((-1, 1)):
         room = 0.5 * width - side * y  # negative beyond the line
         approach = side * speed if room >= 0.0 else -side * speed
-        lines[k] = weight_of(_line(vehicle, side), settings), abs(room), approach, width
+        lines[k] = (
+            weight_of(line_beside(vehicle.road.network, vehicle.lane_index, side), settings),
+            abs(room),
+            approach,
+            width,
+        )
     return lines
-
-
-def _line(vehicle: Any, side: int) -> str:
-    """Kind of the line on one side of a vehicle's lane. It may be drawn as that of the lane beside it."""
-    start, end, number = vehicle.lane_index
-    lanes = vehicle.road.network.graph[start][end]
-    drawn = [vehicle.lane.line_types[(side + 1) // 2]]
-    beside = 0 <= number + side < len(lanes)
-    if beside:
-        drawn.append(lanes[number + side].line_types[(1 - side) // 2])
-    if max(drawn) == LineType.NONE:
-        return "none"
-    if max(drawn) == LineType.STRIPED:
-        return "striped"
-    return "solid" if beside else "edge"

@@ -8,15 +8,13 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from rss_shield.envs.decisions.executed import executed_actions
 from rss_shield.envs.highway.compliant import TurnTaker
-from rss_shield.envs.highway.ego import ShieldedEgo, StepTally, log_of
+from rss_shield.envs.highway.ego import ShieldedEgo, log_of
 from rss_shield.envs.highway.free_ego import FreeEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.options import LANES, Options, Settings
-from rss_shield.shield.comfort import comfort_of
-from rss_shield.shield.lanes.controller import response_name
-from rss_shield.shield.lanes.judge import AT_FAULT, Audit, audit
-
-LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
+from rss_shield.shield.lanes.judge import Audit, audit
+from rss_shield.shield.tally import JUDGED, end_decision, info_at, shield_infos, start_decision
+from rss_shield.shield.verdicts import AT_FAULT
 
 
 def attach(
@@ -56,12 +54,12 @@ def shield_on(vehicle: Any) -> ShieldedEgo | None:
 
 def begin_step(ego: ShieldedEgo) -> bool:
     """Start counting anew; returns whether the ego has had its contact before this step."""
-    ego.tally = StepTally()
+    start_decision(ego.tally)
     if ego.meter is not None:
         ego.meter.begin_step()
     if ego.judge is not ego:
-        ego.judge.tally = StepTally()
-    return ego.contact is not None
+        start_decision(ego.judge.tally)
+    return ego.has_contact
 
 
 def end_step(ego: ShieldedEgo, had_contact: bool, action: Any, kind: Any, handed: Any = None) -> dict[str, Any]:
@@ -76,10 +74,8 @@ def end_step(ego: ShieldedEgo, had_contact: bool, action: Any, kind: Any, handed
     """
     ego.check_contact()
     judge = ego.judge
-    at_fault = not had_contact and judge.contact is not None and judge.contact["verdict"] in AT_FAULT
-    cost = 1.0 if judge.tally.broken_duties or at_fault else 0.0
-    ego.cost += cost
-    info = info_of(ego, cost)
+    at_fault = not had_contact and judge.blame in AT_FAULT
+    info = info_of(ego, 1.0 if judge.tally["broken_duties"] or at_fault else 0.0)
     handed = action if handed is None else handed
     info["shield"]["proposed_action"] = action
     info["shield"]["executed_action"] = _executed(ego.tally, kind, handed)
@@ -87,53 +83,25 @@ def end_step(ego: ShieldedEgo, had_contact: bool, action: Any, kind: Any, handed
     return info
 
 
-def _executed(tally: StepTally, kind: Any, handed: Any) -> Any:
+def _executed(tally: np.void, kind: Any, handed: Any) -> Any:
     """See `executed_actions`."""
-    frames = tally.frames or np.nan
-    commands = np.array([[tally.acceleration / frames, tally.steering / frames]])
-    refused = np.array([tally.lane_change_refused])
+    frames = tally["frames"] or np.nan
+    commands = np.array([[tally["acceleration"] / frames, tally["steering"] / frames]])
+    refused = np.array([tally["lane_change_refused"]])
     return executed_actions(kind, np.asarray(handed)[None], refused, commands)[0]
 
 
 def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
     """What a wrapper says about one ego after a step; see `ShieldWrapper` for the keys."""
-    tally, judge = ego.tally, ego.judge
-    frames, all_frames = max(tally.frames, 1), max(ego.frames, 1)
-    return {
-        "shield": {
-            "intervened": tally.overridden > 0,
-            "override_fraction": tally.overridden / frames,
-            "anticipation_fraction": tally.anticipated / frames,
-            "limited_fraction": tally.limited / frames,
-            "acceleration_change": tally.acceleration_change,
-            "steering_change": tally.steering_change,
-            "mean_acceleration_change": tally.acceleration_changed / frames,
-            "mean_steering_change": tally.steering_changed / frames,
-            "lane_change_refused": tally.lane_change_refused,
-            "dangerous": judge.tally.dangerous_pairs > 0,
-            "dangerous_pairs": judge.tally.dangerous_pairs,
-            "broken_duties": judge.tally.broken_duties,
-            "min_margin_lon": tally.margin_lon,
-            "min_margin_lat": tally.margin_lat,
-            "partner": tally.partner,
-            "response": response_name(tally.response),
-        },
-        "cost": cost,
-        "blame": judge.contact["verdict"] if judge.contact else "",
-        "blame_evidence": dict(judge.contact) if judge.contact else {},
-        "override_share": ego.frames_overridden / all_frames,
-        "anticipation_share": ego.frames_anticipated / all_frames,
-        "limited_share": ego.frames_limited / all_frames,
-        "mean_acceleration_change": ego.acceleration_changed / all_frames,
-        "mean_steering_change": ego.steering_changed / all_frames,
-        "episode_cost": ego.cost,
-        "episode_dangerous_pairs": judge.dangerous_pairs,
-        "episode_broken_duties": judge.broken_duties,
-        "min_ttc": min(ego.min_ttc, LONGEST_TTC),
-        **comfort_of(ego.ride)._asdict(),
-        **(ego.meter.info() if ego.meter is not None else {}),
-        **({"measures": ego.measured.info(ego)} if ego.measured is not None else {}),
-    }
+    end_decision(ego.tally, ego.since, ego.ride, cost)
+    step, judge = np.array([ego.tally]), ego.judge
+    if judge is not ego:
+        end_decision(judge.tally, judge.since, judge.ride, cost)
+        for name in JUDGED:
+            step[name] = judge.tally[name]
+    info = info_at(shield_infos(step, ego.settings.table.dt), 0)
+    info |= {"measures": ego.measured.info(ego)} if ego.measured is not None else {}
+    return info | (ego.meter.info() if ego.meter is not None else {})
 
 
 class Told(gym.Wrapper):
@@ -178,4 +146,4 @@ def audit_of(ego: ShieldedEgo) -> Audit:
             "audit: expected an environment without junctions; where roads cross, infos count the pair-frames: "
             "episode_dangerous_pairs, episode_broken_duties"
         )
-    return audit(log_of(frames), settings.ego, settings.other, settings.rules, settings.dt)
+    return audit(log_of(frames), settings.table)

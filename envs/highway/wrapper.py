@@ -61,8 +61,8 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         and the largest `drac` [m/s^2]. Since reset: max_rdsi (of one source), max_total_rdsi, time_known_safe,
         time_unknown, time_known_unsafe [s], band_risk (integral of RDSI over the stays in the unknown [s]), min_thw
         (at most 100), max_drac. See `shield.risk`.
-      measures: only with the option `measures`, since reset: `min_thw`, `min_ttc_ahead`, `max_drac`, `min_pet`,
-        `near_misses`, `standing_free`, `impact_speed`, `delta_v` (`shield.risk.meter.Measures`); `violation_ego`,
+      measures: only with the option `measures`, since reset: `min_thw_ahead`, `min_ttc_ahead`, `max_drac_ahead`,
+        `min_pet`, `near_misses`, `standing_free`, `impact_speed`, `delta_v` (`shield.risk.meter.Measures`); `violation_ego`,
         `violation_other`, `violation_nobody`: time with a dangerous pair of which the ego, the other or nobody has
         broken a duty by then [s]; `shield_time`: of the shield per frame, mean [s].
       traffic_blame: with compliant traffic, the verdicts of all other cars that have had a contact, each from its
@@ -222,5 +222,4 @@ def traffic_info(wrapper) -> dict[str, Any]:
     """What infos say about compliant traffic."""
     if wrapper.options.traffic == "stock":
         return {}
-    contacts = [driver.contact for driver in wrapper.drivers if driver.check_contact()]
-    return {"traffic_blame": tuple(contact["verdict"] for contact in contacts)}
+    return {"traffic_blame": tuple(driver.blame for driver in wrapper.drivers if driver.check_contact())}

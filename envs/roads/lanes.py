@@ -13,7 +13,8 @@ from highway_env.road.lane import CircularLane, SineLane, StraightLane
 from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from rss_shield.shield.definitions.longitudinal import d_min_longitudinal, euler_margin
+from rss_shield.envs.roads.traced_lane import TracedLane
+from rss_shield.shield.definitions.longitudinal import d_min_longitudinal
 from rss_shield.shield.geometry import (
     AFTER,
     AROUND,
@@ -27,6 +28,7 @@ from rss_shield.shield.geometry import (
     wrap_angle,
 )
 from rss_shield.shield.params import RSSParams
+from rss_shield.shield.sampling import euler_margin
 
 LaneIndex = tuple[str, str, int]
 Way = tuple[tuple[str, str], ...]  # roads one after the other: node where each starts, node where it ends
@@ -169,6 +171,11 @@ def _links(network: Any, index: LaneIndex, shift: float, forward: bool, way: Way
     return [min(aside, key=lambda one: one[:2])[2]]
 
 
+def successors(network: Any, index: LaneIndex) -> list[LaneIndex]:
+    """Lanes that go on where a lane ends; where it just ends, the nearest one beside it."""
+    return [link for link, _, _ in _links(network, index, 0.0, True, ())]
+
+
 def _roads_at(network: Any, index: LaneIndex, forward: bool) -> list[tuple[str, str]]:
     """Roads that start where a lane ends, or that end where it starts."""
     if forward:
@@ -178,6 +185,8 @@ def _roads_at(network: Any, index: LaneIndex, forward: bool) -> list[tuple[str, 
 
 def _pieces_of(lane: Any, shift: float = 0.0) -> list[tuple[float, ...]]:
     """Pieces of constant curvature of one lane, or beside it: start x, y, heading, curvature, length."""
+    if isinstance(lane, TracedLane):
+        return lane.pieces(shift)
     if isinstance(lane, StraightLane) and not isinstance(lane, SineLane):
         (x, y), heading = lane.position(0.0, shift), lane.heading_at(0.0)
         return [(x, y, heading, 0.0, lane.length)]
@@ -197,7 +206,9 @@ def _pieces_of(lane: Any, shift: float = 0.0) -> list[tuple[float, ...]]:
 
 def tightest(network: Any) -> float:
     """Largest curvature of any arc of a network [1/m]."""
-    return max((1.0 / lane.radius for lane in network.lanes_list() if isinstance(lane, CircularLane)), default=0.0)
+    lanes = network.lanes_list()
+    arcs = [1.0 / lane.radius for lane in lanes if isinstance(lane, CircularLane)]
+    return max([*arcs, *(lane.tightest for lane in lanes if isinstance(lane, TracedLane))], default=0.0)
 
 
 def reach_of(ego: RSSParams, other: RSSParams, dt: float) -> float:
@@ -227,12 +238,23 @@ def heading_of(vehicle: Any) -> Heading:
     """
     network, index = vehicle.road.network, vehicle.lane_index
     if not isinstance(vehicle, ControlledVehicle):
-        return Heading(index, (), tuple(lane for lane in _forks(network, index) if _overlaps(vehicle, lane)))
-    target = vehicle.target_lane_index
+        return heading_anywhere(network, index, vehicle.position, vehicle.WIDTH)
+    return heading_toward(network, index, vehicle.target_lane_index, vehicle.route or [])
+
+
+def heading_anywhere(network: Any, index: LaneIndex, position: Any, width: float) -> Heading:
+    """`Heading` of a car on a lane that is steered freely."""
+    return Heading(
+        index, (), tuple(lane for lane in _forks(network, index) if _overlaps(network, lane, position, width))
+    )
+
+
+def heading_toward(network: Any, index: LaneIndex, target: LaneIndex, route: list[LaneIndex]) -> Heading:
+    """`Heading` of a car on a lane that heads for another one and has a route."""
     if target[:2] != index[:2]:
         twins = [lane for lane in _forks(network, index) + _merges(network, index) if lane[:2] == target[:2]]
         index = twins[0] if twins else index
-    return Heading(index, _way_after(index, [target, *(vehicle.route or [])]))
+    return Heading(index, _way_after(index, [target, *route]))
 
 
 def _way_after(index: LaneIndex, route: list[LaneIndex]) -> Way:
@@ -275,8 +297,8 @@ def _meet(lane: Any, s: float, other: Any, at: float) -> bool:
     return bool(np.hypot(*(lane.position(s, 0.0) - other.position(at, 0.0))) < _JOIN and abs(turn) < _TURN)
 
 
-def _overlaps(vehicle: Any, index: LaneIndex) -> bool:
+def _overlaps(network: Any, index: LaneIndex, position: Any, width: float) -> bool:
     """Is any part of a car on a lane?"""
-    lane = vehicle.road.network.get_lane(index)
-    s, lateral = lane.local_coordinates(vehicle.position)
-    return abs(lateral) < (lane.width_at(s) + vehicle.WIDTH) / 2
+    lane = network.get_lane(index)
+    s, lateral = lane.local_coordinates(position)
+    return bool(abs(lateral) < (lane.width_at(s) + width) / 2)

@@ -1,1 +1,1 @@
-"""Where simulators, agents and statistics meet: the only part of `rss_shield.eval` that knows all of them."""
+"""What needs environments and agents to be evaluated: the only part of `eval` that imports them."""

@@ -113,9 +113,3 @@ def time_to_cover(distance, v, rho, a, b, v_cap=np.inf):
 def time_to_stop(v, rho, a, b, v_cap=np.inf):
     """Time to rest under "accelerate at `a` for `rho`, then brake at `b`", from v >= 0 [s]."""
     return rho + speed_after_response(v, rho, a, v_cap) / b
-
-
-@compiled_for_arrays
-def frames_for(duration, dt):
-    """A duration rounded up to whole frames of length `dt`, in frames (condition C2)."""
-    return np.ceil(duration / dt - 1e-9)

@@ -120,19 +120,6 @@ def _largest_approach(w_left, w_right, left, right):
     return largest
 
 
-@compiled_for_arrays
-def lateral_euler_margin(w, car, dt):
-    """What frames of length `dt` need on top of one car's continuous lateral approach [m] (condition C5).
-
-    The lateral speed of a frame is the one chosen at its start: `w dt/2` for the sampled braking,
-    `b dt^2/8` for its last partial step, `a rho dt` because the first frame may already run at the
-    speed reached at its end.
-    """
-    w = np.maximum(w, 0.0)
-    frame_start = car.a_lat_max_accel * car.response_time * dt
-    return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8 + frame_start
-
-
 @compiled_for_anything
 def mu_lateral_velocity(time, path, k, mu):
     """mu-lateral velocity at sample `k` of a recorded lateral path (Def. 5) [m/s]. Offline: it looks ahead.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import choose, compiled, compiled_for_arrays
+from rss_shield.shield._numba.compiled import choose, compiled_for_arrays
 from rss_shield.shield.anything import compiled_for_anything, compiled_for_numbers
 from rss_shield.shield.definitions.kinematics import (
     forward_reach,
@@ -112,32 +112,6 @@ def d_min_longitudinal(v_rear, v_front, facing, rear, front, b_rear, b_front):
     d_rear = forward_reach(v_rear, rear.response_time, rear.a_max_accel, b_rear, rear.v_cap)
     d_front = forward_reach(-v_front, front.response_time, front.a_max_accel, b_front, front.v_cap)
     return d_rear + d_front + np.maximum(rear.standstill_gap, front.standstill_gap)
-
-
-@compiled_for_arrays
-def euler_margin(closing, b, dt):
-    """What explicit Euler needs on top of a continuous longitudinal distance [m] (condition C5).
-
-    The position advances with the speed at the start of the frame, which adds `v dt/2` to each
-    stopping distance; the last partial braking step adds at most `b dt^2/8`.
-
-    Args:
-      closing: speed toward the other, less the speed at which a leader moves away [m/s]. A faster
-        leader would make the margin negative; no credit is taken for it.
-      b: braking of the car that must stop [m/s^2].
-      dt: length of a frame [s].
-    """
-    return np.maximum(closing, 0.0) * dt / 2 + b * dt**2 / 8
-
-
-@compiled
-def reach_from_rest(params, b, dt):
-    """How far a standing car that starts may get until it rests again, sampled every `dt` (Def. 2) [m].
-
-    It speeds up for its response time and then brakes at `b`.
-    """
-    way = forward_reach(0.0, params.response_time, params.a_max_accel, b, params.v_cap)
-    return way + euler_margin(0.0, b, dt)
 
 
 @compiled_for_arrays

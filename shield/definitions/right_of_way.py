@@ -6,7 +6,7 @@ described by distances along its own route, so the geometry stays outside. All f
 Where the paper leaves a choice the safest reading counts: without a priority route *all* cars must be able to stop
 (W1), right of way is given, never taken (W3), every item that was true asks for its braking (W4), item 2 counts on a
 crossing only if the first car leaves (W5), and each car has its own speed cap (W7). Sampled at frames, each car needs
-`with_euler_margin` first.
+`shield.sampling.with_euler_margin` first.
 """
 
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from rss_shield.shield.definitions.kinematics import (
     time_to_cover_accelerating,
     time_to_cover_braking,
 )
-from rss_shield.shield.definitions.longitudinal import d_min_following, euler_margin, is_safe_longitudinally
+from rss_shield.shield.definitions.longitudinal import d_min_following, is_safe_longitudinally
 from rss_shield.shield.definitions.response import FRONT, REAR, lateral_response, longitudinal_response
 from rss_shield.shield.geometry import signed_gap
 
@@ -55,13 +55,6 @@ class Threshold(NamedTuple):
 
 
 UNSEEN = Threshold(0, 0.0, 0.0, 0)  # of a new pair
-
-
-@compiled
-def with_euler_margin(car, params, dt):
-    """A car with its front moved on by what explicit Euler needs (condition C5); its rear stays where it is."""
-    margin = euler_margin(car.v, params.a_min_brake, dt)
-    return Approach(car.enter - margin, car.leave, car.length + margin, car.v, car.priority)
 
 
 # ---------------------------------------------------------------- lateral: Defs. 14, 15

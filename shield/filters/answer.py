@@ -35,7 +35,7 @@ class Traffic(NamedTuple):
 
 
 @apart
-def answer(chosen, wish, traffic, free, answers, begins, body, ego_params, other_params, rules, dt):
+def answer(chosen, wish, traffic, free, answers, begins, body, table):
     """The command that a filter lets through.
 
     Args:
@@ -46,31 +46,32 @@ def answer(chosen, wish, traffic, free, answers, begins, body, ego_params, other
       answers: does a filter that looks once per decision give its response in this one?
       begins: it is the first frame of a decision.
       body: `Body` of the ego.
-      ego_params, other_params, rules, dt: as in `shield.lanes.controller.find_danger`.
+      table: as in `shield.lanes.controller.find_danger`.
 
     Returns:
       `Response`, and `answers` from now on.
     """
+    rules, dt = table.rules, table.dt
     ego, users, who, kind = traffic.ego, traffic.users, traffic.who, chosen.kind
     if kind == LIMITS:
         command = restrict(wish, free, ego, body, rules, dt)
         return Response(command, False, False, command != wish), answers
     if kind == PRINTED_DEF_10:
         if begins:
-            answers = is_dangerous(ego, users, ego_params, other_params, dt, who)
+            answers = is_dangerous(ego, users, table, who)
         command = wish
         if answers:
             bounds = Bounds(-np.inf, np.inf, np.inf, np.inf, np.inf, np.inf, min(ego.speed, 0.0))
-            bounds = printed_duties(bounds, users, traffic.memory, ego_params, dt, who)
+            bounds = printed_duties(bounds, users, traffic.memory, table, who)
             command = restrict(wish, bounds, ego, body, PRINTED, dt)
         return Response(command, command != wish, False, False), answers
     leader = leader_of(ego, users, traffic.offset, who)
     if kind == TTC:
-        cap = time_to_collision.acceleration_cap(ego.speed, leader, chosen.threshold, ego_params)
+        cap = time_to_collision.acceleration_cap(ego.speed, leader, chosen.threshold, table.ego)
     elif kind == DISTANCE:
-        cap = fixed_distance.acceleration_cap(leader, chosen.threshold, ego_params)
+        cap = fixed_distance.acceleration_cap(leader, chosen.threshold, table.ego)
     else:
-        cap = control_barrier.acceleration_cap(ego.speed, leader, chosen.threshold, ego_params)
+        cap = control_barrier.acceleration_cap(ego.speed, leader, chosen.threshold, table.ego)
     command = Command(_capped(wish.acceleration, cap, ego.speed, dt), wish.slip)
     return Response(command, command != wish, False, False), answers
 

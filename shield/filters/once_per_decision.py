@@ -8,7 +8,7 @@ from rss_shield.shield._numba.compiled import compiled
 from rss_shield.shield.chosen import how_many, which
 from rss_shield.shield.lanes.memory import merge
 from rss_shield.shield.lanes.pair import assess
-from rss_shield.shield.params import Rules
+from rss_shield.shield.params import Rules, Table
 
 PRINTED = Rules(
     limits=False,
@@ -24,33 +24,33 @@ PRINTED = Rules(
 
 
 @compiled
-def is_dangerous(ego, users, ego_params, other_params, dt, who=None):
+def is_dangerous(ego, users, table, who=None):
     """Are both printed distances too short toward anybody?
 
     Args:
       ego: `ROAD_USER` record.
       users: `[N]` `ROAD_USER` records of everybody else.
-      ego_params, other_params: `RSSParams`.
-      dt: length of a frame [s].
+      table: `Table`, whose rules do not count here.
       who: `[K]` indices of those who are near, None = everybody.
     """
+    printed = Table(table.ego, table.other, PRINTED, table.dt)
     for a in range(how_many(who, users)):
-        pair = assess(ego, users[which(who, a)], ego_params, other_params, PRINTED, dt)
+        pair = assess(ego, users[which(who, a)], printed)
         if not (pair.safe_lon or pair.safe_lat):
             return True
     return False
 
 
 @compiled
-def printed_duties(bounds, users, memory, ego_params, dt, who=None):
+def printed_duties(bounds, users, memory, table, who=None):
     """What Def. 10 leaves of some `Bounds`, on the axis that was safe last.
 
     Args:
       bounds: `Bounds`.
       users: `[N]` `ROAD_USER` records of everybody else.
       memory: `[N]` `MEMORY` of them, this sample included.
-      ego_params, dt, who: as in `is_dangerous`.
+      table, who: as in `is_dangerous`.
     """
     for a in range(how_many(who, users)):
-        bounds = merge(bounds, memory[which(who, a)], ego_params, PRINTED, dt)
+        bounds = merge(bounds, memory[which(who, a)], table.ego, PRINTED, table.dt)
     return bounds

@@ -41,26 +41,23 @@ from rss_shield.shield.junctions.plans import (
     throttle,
 )
 from rss_shield.shield.lanes.controller import RESPONSE_BRAKE, RESPONSE_GO
-from rss_shield.shield.lanes.judge import (
+from rss_shield.shield.verdicts import (
     ACCELERATED,
-    BOTH,
     BRAKED,
     CRASHED,
     CUT_IN,
-    EGO,
     GAVE_NO_WAY,
-    INHERITED,
     KEPT,
     LEFT_NO_PLAN,
     LEFT_PATHS,
-    NOBODY,
     OTHER,
     REVERSED,
     TOO_FAR,
     TOO_HARD,
     TRAPPED,
     WAVERED,
-    Verdict,
+    judged,
+    who_broke,
 )
 
 CAUTIOUS, PRIORITY, ASSERTIVE = range(3)  # whom the ego expects to give way: nobody, who must, who can
@@ -92,7 +89,7 @@ CROSSING = np.dtype(
         ("lanes", "i8"),  # lanes on which it may be now or next, as a set of bits
         ("ways", "i8"),  # paths that it may be on, likewise
         ("reachable", "i8"),  # likewise, if it changes lanes
-        ("ego_broke", "i8"),  # first duty each broke since the last sample with a plan, index into `blame.DUTIES`
+        ("ego_broke", "i8"),  # first duty each broke since the last sample with a plan, index into `verdicts.DUTIES`
         ("ego_excess", "f8"),
         ("other_broke", "i8"),
         ("other_excess", "f8"),
@@ -712,26 +709,11 @@ def judge_crossing(sample, memory, outside, other, dt):
     _judge_motion(sample, memory, other, dt)
     if outside and memory.other_broke == KEPT:
         memory.other_broke = LEFT_PATHS
-    ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
-    if memory.behind and not ego_broke:
-        verdict = OTHER
+    if memory.behind and memory.ego_broke == KEPT:
         if memory.other_broke == KEPT:
             memory.other_broke = TOO_FAR
-    elif memory.items == 0:
-        verdict = EGO if ego_broke else INHERITED
-    elif ego_broke:
-        verdict = BOTH if other_broke else EGO
-    else:
-        verdict = OTHER if other_broke else NOBODY
-    return Verdict(
-        verdict,
-        memory.items,
-        memory.since,
-        memory.ego_broke,
-        memory.ego_excess,
-        memory.other_broke,
-        memory.other_excess,
-    )
+        return judged(OTHER, memory.items, memory)
+    return judged(who_broke(memory, memory.items == 0), memory.items, memory)
 
 
 @inner

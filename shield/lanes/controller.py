@@ -8,8 +8,7 @@ from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.chosen import how_many, which
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import time_to_collision
-from rss_shield.shield.definitions.lateral import d_min_no_credit, lateral_euler_margin
-from rss_shield.shield.definitions.longitudinal import reach_from_rest
+from rss_shield.shield.definitions.lateral import d_min_no_credit
 from rss_shield.shield.geometry import signed_gap
 from rss_shield.shield.lanes.anticipation import acceleration_cap, farthest_bound, lateral_cap
 from rss_shield.shield.lanes.frame import beyond
@@ -23,7 +22,6 @@ from rss_shield.shield.lanes.memory import (
     owes_lateral_stop,
     owes_no_approach,
     remember,
-    slowest_in_danger,
 )
 from rss_shield.shield.lanes.pair import (
     STANDSTILL,
@@ -33,9 +31,9 @@ from rss_shield.shield.lanes.pair import (
     least_cosine,
     least_margin,
     own_share,
-    sampling_margin,
     toward,
 )
+from rss_shield.shield.sampling import lateral_euler_margin, reach_from_rest, sampling_margin, slowest_in_danger
 
 
 class Danger(NamedTuple):
@@ -89,10 +87,7 @@ def find_danger(
     ego_before,
     users_before,
     memory,
-    ego_params,
-    other_params,
-    rules,
-    dt,
+    table,
     who=None,
     nearest=np.inf,
     soonest=np.inf,
@@ -107,9 +102,7 @@ def find_danger(
       users: `[N]` `ROAD_USER` records of everybody else.
       ego_before, users_before: the same on the frame before; zeros on the first.
       memory: `[N]` `MEMORY` records, changed in place.
-      ego_params, other_params: `RSSParams`, response times in whole frames.
-      rules: `Rules` in force.
-      dt: length of a frame [s].
+      table: `Table` in force.
       who: `[K]` indices in ascending order of those to look at, if not everybody. All others are known to be far
         apart, and marked as skipped.
       nearest: partner and margins are of interest only if nearer to danger than this [m].
@@ -118,15 +111,16 @@ def find_danger(
     Returns:
       `Danger`.
     """
-    free = always_on(ego, ego_params, rules, dt)
+    rules, dt = table.rules, table.dt
+    free = always_on(ego, table.ego, rules, dt)
     bounds, cap, left, right = free, np.inf, np.inf, np.inf
     room_left = room_right = np.inf
-    look = look_ahead_of(ego, ego_params, other_params, rules, dt)
+    look = look_ahead_of(ego, table)
     worst, partner, margin_lon, margin_lat, ttc = nearest, -1, np.inf, np.inf, soonest
     dangerous, response = False, 0
-    share_ego = own_share(ego.speed, ego.cos, ego_params, dt)
+    share_ego = own_share(ego.speed, ego.cos, table.ego, dt)
     lead_ego, least_cos = leading_speed(ego, rules), least_cosine(rules)
-    far, held = beyond_doubt(ego.speed, ego_params, dt), slowest_in_danger(ego.speed, ego_params, dt)
+    far, held = beyond_doubt(ego.speed, table.ego, dt), slowest_in_danger(ego.speed, table.ego, dt)
     for a in range(how_many(who, users)):
         i = which(who, a)
         user = users[i]
@@ -139,9 +133,7 @@ def find_danger(
             share_ego,
             lead_ego,
             least_cos,
-            ego_params,
-            other_params,
-            dt,
+            table,
         )
         if (
             memory[i].since == 0
@@ -151,23 +143,23 @@ def find_danger(
         ):
             memory[i].skipped = True
             continue
-        catch_up(memory[i], ego_before, users_before[i], ego_params, other_params, rules, dt)
-        pair = assess(ego, user, ego_params, other_params, rules, dt)
+        catch_up(memory[i], ego_before, users_before[i], table)
+        pair = assess(ego, user, table)
         remember(memory[i], pair, ego, user, dt)
-        bounds = merge(bounds, memory[i], ego_params, rules, dt)
+        bounds = merge(bounds, memory[i], table.ego, rules, dt)
         if rules.limits and not may_back_up(memory[i], pair):
             bounds = _hold(bounds, held)
         if memory[i].since == 0 and rules.anticipation > 0.0:
             if pair.safe_lon and not pair.safe_lat:
-                cap = min(cap, _cap_behind(pair, memory[i], ego_params, other_params, rules, dt))
+                cap = min(cap, _cap_behind(pair, memory[i], table))
             elif pair.safe_lat and not pair.safe_lon:
-                limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, ego_params, rules.anticipation, dt)
+                limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, table.ego, rules.anticipation, dt)
                 if pair.side > 0.0:
                     right = min(right, limit)
                 else:
                     left = min(left, limit)
         if rules.take_back and not pair.safe_lon and pair.gap_lat > -min(ego.half_width, user.half_width):
-            room = room_beside(pair.margin_lat, pair.w_ego, ego_params, dt)
+            room = room_beside(pair.margin_lat, pair.w_ego, table.ego, dt)
             if pair.side > 0.0:
                 room_right = min(room_right, room)
             else:
@@ -226,7 +218,7 @@ def respond(nominal, danger, ego, body, rules, dt):
 
 
 @inner
-def _cap_behind(pair, memory, ego_params, other_params, rules, dt):
+def _cap_behind(pair, memory, table):
     """Cap of the acceleration behind a pair's other, inf where it is not ahead the same way [m/s^2]."""
     if not pair.ego_is_rear or not is_following(pair.v_ego, pair.v_other, pair.opposite):
         return np.inf
@@ -236,10 +228,10 @@ def _cap_behind(pair, memory, ego_params, other_params, rules, dt):
         pair.v_ego,
         pair.v_other,
         memory.acceleration_other,
-        ego_params,
-        other_params,
-        rules.anticipation,
-        dt,
+        table.ego,
+        table.other,
+        table.rules.anticipation,
+        table.dt,
     )
 
 
@@ -252,14 +244,15 @@ class LookAhead(NamedTuple):
 
 
 @compiled
-def look_ahead_of(ego, ego_params, other_params, rules, dt):
+def look_ahead_of(ego, table):
     """`LookAhead` of the ego on one frame."""
+    rules, dt = table.rules, table.dt
     if rules.anticipation == 0.0:
         return LookAhead(-np.inf, 0.0, 0.0)
     w = max(toward(1.0, ego), toward(-1.0, ego), 0.0)
-    lateral = d_min_no_credit(w, 0.0, ego_params, other_params) + rules.overlap_margin
-    lateral += lateral_euler_margin(w, ego_params, dt) + sampling_margin(0.0, other_params, dt)
-    within, horizon = farthest_bound(max(ego.speed, 0.0), ego_params, other_params, rules.anticipation, dt)
+    lateral = d_min_no_credit(w, 0.0, table.ego, table.other) + rules.overlap_margin
+    lateral += lateral_euler_margin(w, table.ego, dt) + sampling_margin(0.0, table.other, dt)
+    within, horizon = farthest_bound(max(ego.speed, 0.0), table.ego, table.other, rules.anticipation, dt)
     return LookAhead(within, horizon, lateral)
 
 

@@ -20,53 +20,32 @@ from rss_shield.shield._numba.compiled import apart, compiled, compiled_for_arra
 from rss_shield.shield.chosen import how_many, which
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import forward_reach, speed_envelope, travel
-from rss_shield.shield.definitions.lateral import approach_no_credit, lateral_euler_margin
-from rss_shield.shield.definitions.longitudinal import euler_margin
+from rss_shield.shield.definitions.lateral import approach_no_credit
 from rss_shield.shield.definitions.response import FRONT, LAT, LON, NEVER, lateral_speed_limit, longitudinal_response
-from rss_shield.shield.lanes.memory import (
-    MEMORY,
-    catch_up,
-    forget_safe,
-    owes,
-    remember,
-    role_of_ego,
-    role_of_other,
-    slowest_in_danger,
+from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, owes, remember, role_of_ego, role_of_other
+from rss_shield.shield.lanes.pair import assess, head_on_braking, is_following
+from rss_shield.shield.sampling import euler_margin, lateral_euler_margin, sampled_approach, slowest_in_danger
+from rss_shield.shield.verdicts import (
+    KEPT,
+    NOBODY,
+    REVERSED,
+    TOO_CLOSE,
+    TOO_FAR,
+    TOO_HARD,
+    TOO_SHORT,
+    TOO_WEAK,
+    TOWARD,
+    judged,
+    who_broke,
 )
-from rss_shield.shield.lanes.pair import assess, head_on_braking, is_following, sampled_approach
 
-KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
-# at junctions; who is TRAPPED has no plan left toward anybody because a third broke its duty
-LEFT_NO_PLAN, WAVERED, ACCELERATED, BRAKED, LEFT_PATHS, CRASHED, GAVE_NO_WAY, REVERSED, CUT_IN, TRAPPED = range(7, 17)
-DUTIES = (
-    "",
-    "got farther along the lane than its share [m]",
-    "stopped shorter than braking at a_max_brake would [m]",
-    "came closer across the lane than its share [m]",
-    "braked less than the proper response asks [m/s^2]",
-    "braked harder than a_max_brake [m/s^2]",
-    "moved toward the other across the lane [m/s]",
-    "left itself no way to stay clear [m/s^2]",
-    "neither braked nor went on [m/s^2]",
-    "accelerated harder than a_max_accel [m/s^2]",
-    "braked harder than a_max_brake at a junction [m/s^2]",
-    "left every path it could take",
-    "crashed before",
-    "did not give way",
-    "reversed [m/s]",
-    "cut in in front of the other",
-    "none: somebody else had trapped the ego",
-)
-NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
-VERDICTS = ("none", "ego", "other", "both", "inherited")
-AT_FAULT = ("ego", "both")  # verdicts that charge the ego
-
-_NOW, _NEXT_FRAME = np.int64(0), np.int64(1)
+NOW, NEXT_FRAME = np.int64(0), np.int64(1)
 _TOLERANCE = 1e-6  # rounding, in the unit of each duty
 
 
 @inner
-def _blame_ego(memory, duty, excess):
+def blame_ego(memory, duty, excess):
+    """Note that the ego broke a duty, if it did; the first one counts, and the most that it was broken by."""
     if excess > _TOLERANCE:
         if memory.ego_broke == KEPT:
             memory.ego_broke = duty
@@ -84,41 +63,48 @@ def _blame_other(memory, duty, excess):
 
 
 @compiled
-def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
+def judge_motion(memory, ego, user, table, ahead, slack):
+    """`judge_motion_in` of cars that a simulator moves by explicit Euler, frame by frame."""
+    judge_motion_in(memory, ego, user, table, ahead, slack, table.dt)
+
+
+@compiled
+def judge_motion_in(memory, ego, user, table, ahead, slack, step):
     """Hold what each has used of the distance at the threshold against its share, on a dangerous sample.
 
     Args:
       memory: `MEMORY` record after this sample, since > 0; the verdict so far is kept in it.
       ego, user: `ROAD_USER` records.
-      ego_params, other_params: `RSSParams`.
+      table: `Table` in force.
       ahead: frames to extrapolate along the headings: 0, or 1 where contact is predicted.
       slack: how far the ego's heading may overshoot its share in that extrapolation [m]; it lags
         behind the lateral speed, and `overlap_margin` is there for it.
-      dt: length of a frame [s].
+      step: of explicit Euler [s]; 0 where cars move as cars do, and frames are only when somebody looked.
     """
-    step = ahead * dt
+    dt = table.dt
+    later = ahead * dt
     if owes(memory, LON):
-        travel_ego = memory.travel_ego + ego.speed * ego.cos * step
-        travel_other = memory.travel_other + user.speed * user.cos * step
+        travel_ego = memory.travel_ego + ego.speed * ego.cos * later
+        travel_other = memory.travel_other + user.speed * user.cos * later
         longer_ego = ego.half_length - memory.half_length_ego
         longer_other = user.half_length - memory.half_length_other
         # danger from the start is counted from its first sample, any other from the safe one before
         tau = (memory.since - (memory.axes == NEVER) + ahead) * dt
         if not is_following(memory.v_ego, memory.v_other, memory.opposite):
             sign = 1.0 if memory.ego_is_rear else -1.0
-            b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, ego_params, other_params)
-            share = _share_toward(sign * memory.v_ego, ego_params, b_ego, dt)
-            _blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
-            share = _share_toward(-sign * memory.v_other, other_params, b_other, dt)
+            b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, table.ego, table.other)
+            share = _share_toward(sign * memory.v_ego, table.ego, b_ego, step)
+            blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
+            share = _share_toward(-sign * memory.v_other, table.other, b_other, step)
             _blame_other(memory, TOO_FAR, -sign * travel_other + longer_other - share)
         elif memory.ego_is_rear:
-            _blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, ego_params, dt))
-            share = _share_front(tau, memory.v_other, other_params, dt)
+            blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, table.ego, step))
+            share = _share_front(tau, memory.v_other, table.other, step)
             _blame_other(memory, TOO_SHORT, share - travel_other + longer_other)
         else:
-            share = _share_front(tau, memory.v_ego, ego_params, dt) - memory.way_back
-            _blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
-            share = _share_rear(tau, memory.v_other, other_params, dt)
+            share = _share_front(tau, memory.v_ego, table.ego, step) - memory.way_back
+            blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
+            share = _share_rear(tau, memory.v_other, table.other, step)
             _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
         if ahead == 0 and memory.age > 1 and not user.wreck:
             duty, excess = _audit_acceleration(
@@ -126,18 +112,18 @@ def judge_motion(memory, ego, user, ego_params, other_params, ahead, slack, dt):
                 tau - dt,
                 memory.speed_other - memory.acceleration_other * dt,
                 memory.acceleration_other,
-                other_params,
+                table.other,
                 dt,
             )
             _blame_other(memory, duty, excess)
     if owes(memory, LAT):
-        used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * step
-        share = approach_no_credit(memory.w_ego, ego_params) + lateral_euler_margin(memory.w_ego, ego_params, dt)
-        _blame_ego(memory, TOO_CLOSE, used - share - slack)
-        used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * step
+        used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * later
+        share = approach_no_credit(memory.w_ego, table.ego) + lateral_euler_margin(memory.w_ego, table.ego, step)
+        blame_ego(memory, TOO_CLOSE, used - share - slack)
+        used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * later
         # a driver may already use the first frame's growth on it; mu has room for that
-        first_frame = other_params.a_lat_max_accel * dt**2
-        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, other_params, dt) - first_frame)
+        first_frame = table.other.a_lat_max_accel * step**2
+        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, table.other, step) - first_frame)
 
 
 @inner
@@ -220,46 +206,34 @@ def _audit_acceleration(role, tau, v, a, params, dt):
 
 
 @apart
-def judge_frame(ego, users, memory, command, curvature, ego_params, other_params, dt, who=None):
+def judge_frame(ego, users, memory, command, curvature, table, who=None):
     """Judge one frame of all pairs after `find_danger` has updated their memory.
 
     Args:
       ego, users, memory: as in `find_danger`; the verdict so far is kept in `memory`.
       command: `Command` that the ego executes on this frame.
       curvature: of the lane under the ego, see `shield.lanes.frame.Bend` [1/m].
-      ego_params, other_params, dt: as in `find_danger`.
+      table: as in `find_danger`.
       who: as in `find_danger`; nobody else may be in danger.
 
     Returns:
       (pairs, broken): dangerous pairs on this frame, and those whose duty the ego broke on it.
     """
-    drift = 0.5 * curvature * ego.speed**2 * dt
+    drift = 0.5 * curvature * ego.speed**2 * table.dt
     pairs = broken = 0
     for a in range(how_many(who, users)):
         i = which(who, a)
         if memory[i].since > 0:
-            judge_motion(memory[i], ego, users[i], ego_params, other_params, _NOW, 0.0, dt)
-            duty, excess = audit_command(memory[i], ego, command, drift, ego_params, dt)
-            _blame_ego(memory[i], duty, excess)
+            judge_motion(memory[i], ego, users[i], table, NOW, 0.0)
+            duty, excess = audit_command(memory[i], ego, command, drift, table.ego, table.dt)
+            blame_ego(memory[i], duty, excess)
             pairs += 1
             broken += duty != KEPT
     return pairs, broken
 
 
-class Verdict(NamedTuple):
-    """Who is to blame for a contact, with the evidence."""
-
-    verdict: int  # index into VERDICTS
-    axes: int  # axes safe at the threshold: kind of danger (`response.NEVER | LON | LAT`)
-    frames: int  # from the threshold to the contact
-    ego_duty: int  # first duty broken, index into DUTIES
-    ego_excess: float
-    other_duty: int
-    other_excess: float
-
-
 @apart
-def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
+def judge_contact(ego, user, memory, table):
     """Verdict at the first contact of the ego with one road user (Def. 27).
 
     Args:
@@ -271,30 +245,20 @@ def judge_contact(ego, user, memory, ego_params, other_params, rules, dt):
       `Verdict`. "inherited": never safe since first sight and the ego responded properly all the
       time. "none" must not happen: a margin is missing.
     """
-    pair = assess(ego, user, ego_params, other_params, rules, dt)
-    remember(memory, pair, ego, user, dt)
+    pair = assess(ego, user, table)
+    remember(memory, pair, ego, user, table.dt)
     if memory.since > 0:
-        judge_motion(memory, ego, user, ego_params, other_params, _NOW, 0.0, dt)
+        judge_motion(memory, ego, user, table, NOW, 0.0)
         # the simulator predicts contacts one frame ahead
-        judge_motion(memory, ego, user, ego_params, other_params, _NEXT_FRAME, rules.overlap_margin, dt)
-    ego_broke, other_broke = memory.ego_broke != KEPT, memory.other_broke != KEPT
-    if memory.since == 0:
-        verdict = NOBODY
-    elif memory.axes == NEVER:
-        verdict = EGO if ego_broke else INHERITED
-    elif ego_broke:
-        verdict = BOTH if other_broke else EGO
-    else:
-        verdict = OTHER if other_broke else NOBODY
-    return Verdict(
-        verdict,
-        memory.axes,
-        memory.since,
-        memory.ego_broke,
-        memory.ego_excess,
-        memory.other_broke,
-        memory.other_excess,
-    )
+        judge_motion(memory, ego, user, table, NEXT_FRAME, table.rules.overlap_margin)
+    return sum_up(memory)
+
+
+@compiled
+def sum_up(memory):
+    """`Verdict` of a contact by what is remembered of the pair."""
+    never_safe = memory.axes == NEVER
+    return judged(NOBODY if memory.since == 0 else who_broke(memory, never_safe), memory.axes, memory)
 
 
 class Log(NamedTuple):
@@ -320,18 +284,17 @@ class Audit(NamedTuple):
 
 
 @compiled_for_arrays
-def audit(log, ego_params, other_params, rules, dt):
+def audit(log, table):
     """Replay a log and say for every dangerous pair-frame whether the ego kept its duty (Defs. 4, 8, 10).
 
     Args:
       log: `Log`.
-      ego_params, other_params: `RSSParams`, response times in whole frames.
-      rules: `Rules` in force.
-      dt: length of a frame [s].
+      table: `Table` in force.
 
     Returns:
       `Audit`.
     """
+    dt = table.dt
     frames, count = log.present.shape
     dangerous = np.zeros((frames, count), np.bool_)
     duty = np.zeros((frames, count), np.int64)
@@ -346,10 +309,10 @@ def audit(log, ego_params, other_params, rules, dt):
                 continue
             if log.jumped[t, i]:
                 forget_safe(memory[i])
-            catch_up(memory[i], log.ego_before[t], log.users_before[t, i], ego_params, other_params, rules, dt)
-            pair = assess(ego, log.users[t, i], ego_params, other_params, rules, dt)
+            catch_up(memory[i], log.ego_before[t], log.users_before[t, i], table)
+            pair = assess(ego, log.users[t, i], table)
             remember(memory[i], pair, ego, log.users[t, i], dt)
             if memory[i].since > 0:
                 dangerous[t, i] = True
-                duty[t, i], excess[t, i] = audit_command(memory[i], ego, command, drift, ego_params, dt)
+                duty[t, i], excess[t, i] = audit_command(memory[i], ego, command, drift, table.ego, dt)
     return Audit(dangerous, duty, excess)

@@ -58,7 +58,7 @@ MEMORY = np.dtype(
         ("side_now", "f8"),  # 0 = squarely ahead or behind
         ("side_for", "i8"),
         ("w_side", "f8"),  # speed of the ego toward that side when this came about [m/s]
-        # first duty that each broke since t_b (`blame.DUTIES`) and the most it was broken by
+        # first duty that each broke since t_b (`verdicts.DUTIES`) and the most it was broken by
         ("ego_broke", "i8"),
         ("ego_excess", "f8"),
         ("other_broke", "i8"),
@@ -125,15 +125,15 @@ def _note_situation(memory, pair, narrower, other_in_own_lane):
 
 
 @compiled
-def catch_up(memory, ego_before, user_before, ego_params, other_params, rules, dt):
+def catch_up(memory, ego_before, user_before, table):
     """Take in the last sample, if it was skipped, in place. It is the threshold of a danger that begins now."""
     if memory.skipped:
-        _take_in(memory, ego_before, user_before, ego_params, other_params, rules, dt)
+        _take_in(memory, ego_before, user_before, table)
 
 
 @rare
-def _take_in(memory, ego, user, ego_params, other_params, rules, dt):
-    remember(memory, assess(ego, user, ego_params, other_params, rules, dt), ego, user, dt)
+def _take_in(memory, ego, user, table):
+    remember(memory, assess(ego, user, table), ego, user, table.dt)
 
 
 @compiled
@@ -206,12 +206,6 @@ def may_back_up(memory, pair):
     if memory.since > 0:
         return pair.ego_is_rear and memory.ego_is_rear
     return not pair.hems_in or (pair.safe_lat and not pair.safe_lon)
-
-
-@compiled
-def slowest_in_danger(v, params, dt):
-    """Least speed after a frame of a car that may not back up, negative while it still rolls back [m/s]."""
-    return min(v + params.a_min_brake * dt, 0.0)
 
 
 # ---------------------------------------------------------------- merge over all neighbours: Def. 10

@@ -6,19 +6,10 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.definitions.kinematics import reach, stopping_distance
-from rss_shield.shield.definitions.lateral import (
-    approach_no_credit,
-    d_min_no_credit,
-    d_min_of_pair,
-    lateral_euler_margin,
-)
-from rss_shield.shield.definitions.longitudinal import (
-    d_min_longitudinal,
-    euler_margin,
-    is_safe_longitudinally,
-    reach_from_rest,
-)
+from rss_shield.shield.definitions.lateral import d_min_no_credit, d_min_of_pair
+from rss_shield.shield.definitions.longitudinal import d_min_longitudinal, is_safe_longitudinally
 from rss_shield.shield.geometry import signed_gap
+from rss_shield.shield.sampling import euler_margin, lateral_euler_margin, reach_from_rest, sampling_margin
 
 # One road user in the lane frame of the ego. SI units; lateral values positive to the right.
 ROAD_USER = np.dtype(
@@ -74,40 +65,39 @@ def toward(side, user):
 
 
 @compiled
-def assess(ego, user, ego_params, other_params, rules, dt):
+def assess(ego, user, table):
     """Evaluate both axes of one pair on one frame.
 
     Args:
       ego, user: `ROAD_USER` records.
-      ego_params, other_params: `RSSParams`, response times in whole frames.
-      rules: `Rules` in force.
-      dt: length of a frame [s].
+      table: `Table` in force.
 
     Returns:
       `Pair`.
     """
+    rules, dt = table.rules, table.dt
     ego_is_rear = user.s >= ego.s
     opposite = user.cos < 0.0
     side = 1.0 if user.y >= ego.y else -1.0
     gap_lon = signed_gap(user.s - ego.s, ego.half_length, user.half_length)
     gap_lat = signed_gap(user.y - ego.y, ego.half_width, user.half_width)
 
-    v_ego, v_other, d_lon = _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt)
+    v_ego, v_other, d_lon = _longitudinal(ego, user, ego_is_rear, opposite, table)
 
     w_ego, w_other = toward(side, ego), toward(-side, user)
     if rules.no_credit:
-        d_lat = d_min_no_credit(w_ego, w_other, ego_params, other_params)
+        d_lat = d_min_no_credit(w_ego, w_other, table.ego, table.other)
     else:
-        d_lat = d_min_of_pair(w_ego, w_other, ego_params, other_params)
+        d_lat = d_min_of_pair(w_ego, w_other, table.ego, table.other)
     w_ego, w_other = max(w_ego, 0.0), max(w_other, 0.0)
     if rules.discretisation_margin:
-        d_lat += lateral_euler_margin(w_ego, ego_params, dt) + sampling_margin(w_other, other_params, dt)
+        d_lat += lateral_euler_margin(w_ego, table.ego, dt) + sampling_margin(w_other, table.other, dt)
     d_lat += rules.overlap_margin
 
     hems_in, way_back = False, 0.0
     if not ego_is_rear and v_ego == 0.0 and is_following(v_ego, v_other, opposite):
         # the distance of Lemma 2 leaves a leader nothing to go back
-        way_back = reach_from_rest(ego_params, ego_params.a_min_brake, dt)
+        way_back = reach_from_rest(table.ego, table.ego.a_min_brake, dt)
         hems_in = gap_lon < d_lon + way_back
         way_back = 0.0 if hems_in else way_back
 
@@ -150,7 +140,7 @@ def own_share(v, cos, params, dt):
 
 
 @compiled
-def least_margin(distance, half_lengths, v, cos, wreck, share_ego, lead_ego, least_cos, ego_params, other_params, dt):
+def least_margin(distance, half_lengths, v, cos, wreck, share_ego, lead_ego, least_cos, table):
     """Lower bound of `Pair.margin_lon` at a fraction of the price of `assess` [m]; -inf where none is known.
 
     Args:
@@ -160,16 +150,16 @@ def least_margin(distance, half_lengths, v, cos, wreck, share_ego, lead_ego, lea
       share_ego: `own_share` of the ego.
       lead_ego: `leading_speed` of the ego.
       least_cos: `least_cosine`.
-      ego_params, other_params, dt: as in `assess`.
+      table: as in `assess`.
     """
     if v < 0.0 or cos <= 0.0 or share_ego[0] == np.inf:
         return -np.inf
     if distance >= 0.0:
         way, margins = share_ego
-        way -= _credit(slowed(v, cos, wreck, least_cos), ego_params, other_params)
+        way -= _credit(slowed(v, cos, wreck, least_cos), table.ego, table.other)
     else:
-        way, margins = own_share(v, cos, other_params, dt)
-        way -= _credit(lead_ego, other_params, ego_params)
+        way, margins = own_share(v, cos, table.other, table.dt)
+        way -= _credit(lead_ego, table.other, table.ego)
     return abs(distance) - half_lengths - (max(way, 0.0) + margins)
 
 
@@ -203,22 +193,10 @@ def slowed(v, cos, wreck, least_cos):
     return min(v, 0.0) if wreck else v
 
 
-@compiled
-def sampled_approach(w, car, dt):
-    """Farthest a compliant car may come, sampled every `dt`, from speed `w` toward its neighbour [m]."""
-    w = max(w, 0.0)
-    return approach_no_credit(w, car) + sampling_margin(w, car, dt)
-
-
-@compiled
-def sampling_margin(w, car, dt):
-    """What sampling every `dt` adds to that, w >= 0 [m]."""
-    return w * dt / 2 + car.a_lat_min_brake * dt**2 / 8
-
-
 @inner
-def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, rules, dt):
+def _longitudinal(ego, user, ego_is_rear, opposite, table):
     """Speeds along the lane as Def. 1 or 2 must assume them, and the required gap."""
+    rules, dt = table.rules, table.dt
     # A follower may turn back into the lane at any time: its whole speed counts.
     # An ego that backs up may straighten, too.
     v_ego = _fastest(ego) if ego_is_rear else min(leading_speed(ego, rules), ego.speed)
@@ -230,15 +208,15 @@ def _longitudinal(ego, user, ego_is_rear, opposite, ego_params, other_params, ru
         v_other = leading_speed(user, rules) if ego_is_rear else _fastest(user)
     v_ego, v_other = _settled(v_ego), _settled(v_other)
 
-    b_ego, b_other = head_on_braking(opposite, user.in_own_lane, ego_params, other_params)
+    b_ego, b_other = head_on_braking(opposite, user.in_own_lane, table.ego, table.other)
     if ego_is_rear:
-        d = d_min_longitudinal(v_ego, v_other, opposite, ego_params, other_params, b_ego, b_other)
+        d = d_min_longitudinal(v_ego, v_other, opposite, table.ego, table.other, b_ego, b_other)
     else:
-        d = d_min_longitudinal(v_other, v_ego, opposite, other_params, ego_params, b_other, b_ego)
+        d = d_min_longitudinal(v_other, v_ego, opposite, table.other, table.ego, b_other, b_ego)
     if rules.discretisation_margin:
         direction = 1.0 if ego_is_rear else -1.0
         if is_following(v_ego, v_other, opposite):
-            b_rear = ego_params.a_min_brake if ego_is_rear else other_params.a_min_brake
+            b_rear = table.ego.a_min_brake if ego_is_rear else table.other.a_min_brake
             d += euler_margin(direction * (v_ego - v_other), b_rear, dt)
         else:
             d += euler_margin(direction * v_ego, b_ego, dt) + euler_margin(-direction * v_other, b_other, dt)

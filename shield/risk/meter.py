@@ -26,9 +26,9 @@ CROSSING = math.radians(30.0)  # courses that differ by less do not cross
 class Measures(NamedTuple):
     """Of an episode so far."""
 
-    min_thw: float = LONGEST  # THW toward the nearest one ahead in the ego's way, smallest [s]
+    min_thw_ahead: float = LONGEST  # THW toward the nearest one ahead in the ego's way, smallest [s]
     min_ttc_ahead: float = LONGEST  # TTC toward the same [s]
-    max_drac: float = 0.0  # DRAC toward the same, largest [m/s^2]
+    max_drac_ahead: float = 0.0  # DRAC toward the same, largest [m/s^2]
     min_pet: float = LONGEST  # PET with anybody whose course crosses the ego's, smallest [s]
     near_misses: int = 0  # how often TTC fell below 1.5 s
     standing_free: float = 0.0  # how long the ego stands by now with nobody within 20 m [s]
@@ -65,9 +65,9 @@ class EpisodeMeter:
         free = abs(poses[-1, 3]) < STANDS and nearest > ROOM
         near = ttc < NEAR_MISS
         self.measures = old._replace(
-            min_thw=min(old.min_thw, thw),
+            min_thw_ahead=min(old.min_thw_ahead, thw),
             min_ttc_ahead=min(old.min_ttc_ahead, ttc),
-            max_drac=max(old.max_drac, drac),
+            max_drac_ahead=max(old.max_drac_ahead, drac),
             near_misses=old.near_misses + (near and not self.near),
             standing_free=old.standing_free + self.dt if free else 0.0,
         )

@@ -82,7 +82,7 @@ def test_what_a_dict_leaves_out_is_that_of_the_environment():
 def test_a_response_time_that_was_asked_for_is_not_raised_silently():
     with pytest.raises(ValueError, match=r"response_time = 0\.1 s .* expected >= 0\.2 s"):
         make("highway-fast-v0", params={"ego": {"response_time": 0.1}})
-    assert make("highway-fast-v0", params={"ego": {"a_max_accel": 2.0}}).settings.ego.response_time == 0.2
+    assert make("highway-fast-v0", params={"ego": {"a_max_accel": 2.0}}).settings.table.ego.response_time == 0.2
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_a_response_time_that_was_asked_for_is_not_raised_silently():
 @pytest.mark.parametrize("build", [make, lambda env_id, **o: make_vec(env_id, 2, **o)], ids=["make", "make_vec"])
 def test_a_wrong_table_is_named(build, params, message):
     if message is None:
-        assert build("highway-fast-v0", params=params).settings.other.a_min_brake == 4.0
+        assert build("highway-fast-v0", params=params).settings.table.other.a_min_brake == 4.0
     else:
         with pytest.raises(ValueError, match=message):
             build("highway-fast-v0", params=params)
@@ -130,8 +130,8 @@ def test_wrong_rules_are_named(rules, message):
 )
 def test_rules_may_be_those_that_differ(rules):
     expected = Rules(**{name: type(Rules._field_defaults[name])(value) for name, value in rules.items()})
-    assert make("highway-fast-v0", rules=rules).settings.rules == expected
-    assert make_vec("highway-fast-v0", 1, rules=rules).settings.rules == expected
+    assert make("highway-fast-v0", rules=rules).settings.table.rules == expected
+    assert make_vec("highway-fast-v0", 1, rules=rules).settings.table.rules == expected
 
 
 # ---------------------------------------------------------------- specifications

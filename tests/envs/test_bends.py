@@ -16,6 +16,7 @@ from rss_shield.shield.geometry import locate
 from rss_shield.shield.lanes.controller import Body, always_on, restrict
 from rss_shield.shield.lanes.frame import Bend, look_ahead, to_lane_frame
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.params import Table
 
 TABLE = PRESETS["simulator"]
 BOX = np.array([5.0, 2.0, 2.5, 1.0])
@@ -178,7 +179,7 @@ def meet(kind, radius, turn, pieces, lane, gap, speed, faster=0.0, overrides=Tru
     other = kind(road, theirs.position(at + gap, 0), theirs.heading_at(at + gap), speed + faster)
     road.vehicles += [vehicle, other]
     other.ego = vehicle
-    settings = Settings(TABLE.ego, TABLE.other, Rules(), overrides, 1 / 15)
+    settings = Settings(Table(TABLE.ego, TABLE.other, Rules(), 1 / 15), overrides)
     shield = ShieldedEgo(vehicle, settings, record=True)
     for _ in range(180):
         road.act()
@@ -195,8 +196,8 @@ def test_an_ego_that_keeps_its_lane_in_a_bend_is_not_blamed_for_being_rammed_fro
     for lane in (0, 1):
         for gap in (-9.0, -16.0):
             shield = meet(Tailgater, radius, turn, pieces, lane, gap, 15.0, faster=5.0)
-            assert shield.broken_duties == 0
-            verdicts.append(shield.contact and shield.contact["verdict"])
+            assert shield.since["broken_duties"] == 0
+            verdicts.append(shield.blame or None)
     assert set(verdicts) <= {"inherited", "other"}
 
 
@@ -207,8 +208,8 @@ def test_who_swerves_into_an_ego_that_keeps_its_lane_in_a_bend_is_blamed_alone(r
     for lane in (0, 1):
         for gap in (-2.0, 3.0):
             shield = meet(Swerver, radius, turn, pieces, lane, gap, 16.0)
-            assert shield.broken_duties == 0
-            verdicts.append(shield.contact["verdict"] if shield.contact else "")
+            assert shield.since["broken_duties"] == 0
+            verdicts.append(shield.blame)
     assert set(verdicts) <= {"other", ""} and "other" in verdicts
 
 
@@ -217,7 +218,7 @@ def test_who_swerves_into_an_ego_that_keeps_its_lane_in_a_bend_is_blamed_alone(r
 def test_beside_each_other_in_a_bend_nobody_comes_closer(radius, turn):
     shield = meet(IDMVehicle, radius, turn, 4, 0, 0.5, 14.0, overrides=False)
     toward = [abs(frame.users["u"][0]) for frame in shield.record]
-    assert shield.contact is None and max(toward[2:]) < 0.5
+    assert not shield.has_contact and max(toward[2:]) < 0.5
     assert np.mean(toward) < 0.1
 
 

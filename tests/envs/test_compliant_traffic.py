@@ -13,6 +13,7 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.shield.junctions.conflict_areas import CELL
 from rss_shield.shield.junctions.controller import ASSERTIVE, CAUTIOUS, PRIORITY
 from rss_shield.shield.junctions.plans import ANY, KNOWN
+from rss_shield.shield.verdicts import OTHER
 
 
 def crashes(env, seeds):
@@ -114,7 +115,7 @@ def test_nobody_relies_on_who_has_no_plan_or_does_not_wait_for_its_turn():
     env = make("intersection-v0", traffic="compliant")
     env.reset(seed=2)
     env.step(2)
-    last = max((d for d in env.drivers if d.frames), key=lambda driver: driver.turn)
+    last = max((d for d in env.drivers if d.since["frames"]), key=lambda driver: driver.turn)
     first = next(d for d in env.drivers if last.vehicle in d.others and last.vehicle not in heeded(d))
     for change in ("trapped", "assertive", "contact"):
         settings = last.settings
@@ -123,9 +124,9 @@ def test_nobody_relies_on_who_has_no_plan_or_does_not_wait_for_its_turn():
         elif change == "assertive":
             last.settings = settings._replace(entry=ASSERTIVE)
         else:
-            last.contact = {"verdict": "other"}
+            last.since["blame"] = 1 + OTHER
         assert last.vehicle in heeded(first)
-        last.trapped, last.settings, last.contact = False, settings, None
+        last.trapped, last.settings, last.since["blame"] = False, settings, 0
         assert last.vehicle not in heeded(first)
 
 
@@ -163,7 +164,7 @@ def test_cars_that_come_later_are_shielded_from_their_first_frame():
         assert all("act" in vars(vehicle) for vehicle in before)
     late = [driver for driver in env.drivers if driver.vehicle not in at_reset]
     assert late
-    assert all(driver.frames % 15 == 0 and driver.frames > 0 for driver in late)
+    assert all(driver.since["frames"] % 15 == 0 and driver.since["frames"] > 0 for driver in late)
 
 
 def test_drivers_of_cars_that_have_left_are_dropped():

@@ -11,7 +11,7 @@ from rss_shield.envs.decisions.replacement import NEAREST, order_of, replace
 from rss_shield.shield.lanes.controller import Body
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
-from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.params import PRESETS, Rules, Table
 
 ALL = np.arange(5)
 DT = 0.2
@@ -39,7 +39,7 @@ def user(**fields):
 
 def looked_ahead(ego, other, aim, frames=15, rules=Rules(anticipation=0.0)):
     seen = Seen(ego[0], other, ego[0], other.copy(), np.zeros(1, MEMORY))
-    return first_response(seen, make_stage(1), aim, BODY, frames, CAR, OTHER, rules, DT)
+    return first_response(seen, make_stage(1), aim, BODY, frames, Table(CAR, OTHER, rules, DT))
 
 
 def frame_of_danger(gap, v, target, v_front, frames=15):

@@ -134,7 +134,7 @@ def test_copies_in_compliant_traffic_tell_of_their_own_drivers():
     clone = wrapper_by_wrapper(env)
     play(clone, 2)
     on_road = {id(shield_on(v)) for v in clone.unwrapped.road.vehicles}
-    assert {id(driver) for driver in clone.drivers if not driver.contact} <= on_road
+    assert {id(driver) for driver in clone.drivers if not driver.has_contact} <= on_road
     assert not on_road & {id(driver) for driver in env.drivers}
 
 

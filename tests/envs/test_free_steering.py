@@ -53,8 +53,8 @@ def driver(env):
         return np.zeros(2, np.float32)
     ego._declared(vehicle)
     lanes, way, k = ego._way()
-    acceleration = np.clip((9.0 - vehicle.speed) / ego.settings.dt, -5.0, 5.0)
-    steering = lane_keeping(lanes[way[k]], ego._state(), acceleration, ego.dynamical, ego.settings.dt)
+    acceleration = np.clip((9.0 - vehicle.speed) / ego.settings.table.dt, -5.0, 5.0)
+    steering = lane_keeping(lanes[way[k]], ego._state(), acceleration, ego.dynamical, ego.settings.table.dt)
     return np.clip([acceleration / 5.0, steering / top], -1.0, 1.0).astype(np.float32)
 
 

@@ -13,6 +13,7 @@ from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import road_through
 from rss_shield.shield.definitions.response import LAT, LON
 from rss_shield.shield.geometry import locate
+from rss_shield.shield.params import Table
 
 DT = 1 / 15
 TABLE = PRESETS["simulator"]
@@ -25,7 +26,7 @@ def straight_road(lanes=2):
 def shielded(road, x=0.0, lane=0, speed=25.0, overrides=True, rules=Rules(anticipation=0.0, take_back=False)):
     vehicle = MDPVehicle(road, [x, 4.0 * lane], heading=0.0, speed=speed)
     road.vehicles.append(vehicle)
-    return ShieldedEgo(vehicle, Settings(TABLE.ego, TABLE.other, rules, overrides, DT), record=True)
+    return ShieldedEgo(vehicle, Settings(Table(TABLE.ego, TABLE.other, rules, DT), overrides), record=True)
 
 
 def drive(road, frames):
@@ -44,7 +45,7 @@ def test_an_ego_behind_a_slow_car_brakes_at_its_guaranteed_rate_and_stays_behind
     assert (accelerations == -TABLE.ego.a_min_brake).any()
     assert accelerations.min() == -TABLE.ego.a_min_brake
     assert leader.position[0] - ego.vehicle.position[0] > 5.0
-    assert ego.contact is None
+    assert not ego.has_contact
 
 
 def test_a_car_in_the_next_lane_is_no_reason_to_brake_but_blocks_the_lane_change():
@@ -55,8 +56,8 @@ def test_a_car_in_the_next_lane_is_no_reason_to_brake_but_blocks_the_lane_change
     drive(road, 60)
     assert all(frame.command.acceleration > -1.0 for frame in ego.record)
     assert 0.0 < ego.vehicle.position[1] < 2.0
-    assert ego.contact is None
-    assert ego.frames_overridden > 0
+    assert not ego.has_contact
+    assert ego.since["frames_overridden"] > 0
 
 
 def test_a_free_lane_change_goes_through_at_the_lateral_limit():
@@ -65,7 +66,7 @@ def test_a_free_lane_change_goes_through_at_the_lateral_limit():
     ego.act("LANE_RIGHT")
     drive(road, 75)  # 5 s
     assert ego.vehicle.position[1] == pytest.approx(4.0, abs=0.1)
-    assert ego.frames_overridden == 0
+    assert ego.since["frames_overridden"] == 0
     lateral = np.diff([frame.poses[-1, 1] for frame in ego.record]) / DT
     assert np.diff(np.abs(lateral)).max() <= TABLE.ego.a_lat_max_accel * DT + 1e-9
 
@@ -76,7 +77,7 @@ def test_an_obstacle_on_the_road_is_somebody_to_stop_for():
     road.objects.append(Obstacle(road, [90.0, 0.0]))
     drive(road, 150)
     assert ego.vehicle.speed == 0.0
-    assert ego.contact is None
+    assert not ego.has_contact
     gap = 90.0 - 1.0 - (ego.vehicle.position[0] + 2.5)
     assert 1.0 <= gap < 2.0  # the standstill gap and a little
 
@@ -87,11 +88,11 @@ def test_a_predicted_contact_is_judged_before_the_impact_moves_anybody():
     wall = Obstacle(road, [30.0, 0.0])
     road.objects.append(wall)
     before = None
-    while ego.contact is None:
+    while not ego.has_contact:
         before = ego.vehicle.position.copy()
         drive(road, 1)
         ego.check_contact()
-    assert ego.contact["verdict"] in ("ego", "inherited")
+    assert ego.blame in ("ego", "inherited")
     assert ego.vehicle.impact is not None or ego.vehicle.crashed
     assert np.allclose(ego.vehicle.position - before, [25.0 * DT, 0.0], atol=0.3)
 
@@ -199,11 +200,11 @@ def test_a_car_that_becomes_touchable_counts_from_then_on():
     ego = shielded(road)
     ghost = place_ghost(road, 100.0, 5.0, Vehicle)
     drive(road, 5)
-    assert ego.dangerous_pairs == 0
+    assert ego.since["dangerous_pairs"] == 0
     assert len(ego.others) == 0
     ghost.collidable = True
     drive(road, 60)
-    assert ego.dangerous_pairs > 0
+    assert ego.since["dangerous_pairs"] > 0
     assert not ego.vehicle.crashed
 
 
@@ -213,8 +214,8 @@ def test_an_ego_that_nobody_can_touch_owes_nothing():
     ego.vehicle.collidable = False
     road.vehicles.append(Vehicle(road, [30.0, 0.0], speed=0.0))
     drive(road, 60)
-    assert ego.dangerous_pairs == 0
-    assert ego.contact is None
+    assert ego.since["dangerous_pairs"] == 0
+    assert not ego.has_contact
 
 
 def test_in_compliant_traffic_a_car_that_cannot_be_touched_has_no_shield():

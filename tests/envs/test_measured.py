@@ -6,7 +6,16 @@ import pytest
 from rss_shield import make, make_vec
 from rss_shield.eval.suite.scripted import play
 
-SHARED = ("min_thw", "min_ttc_ahead", "max_drac", "min_pet", "near_misses", "standing_free", "impact_speed", "delta_v")
+SHARED = (
+    "min_thw_ahead",
+    "min_ttc_ahead",
+    "max_drac_ahead",
+    "min_pet",
+    "near_misses",
+    "standing_free",
+    "impact_speed",
+    "delta_v",
+)
 SEEDS = range(10**9, 10**9 + 6)
 
 

@@ -234,21 +234,21 @@ def test_a_response_time_below_one_frame_is_refused():
     slow = PRESETS["simulator"].ego._replace(mu=0.2)  # 2/15 s, but a frame of highway-fast-v0 lasts 1/5 s
     with pytest.raises(ValueError, match=r"response_time = 0\.133333 s .* expected >= 0\.2 s"):
         make("highway-fast-v0", params=(slow, slow))
-    assert make("highway-v0", params=(slow, slow)).settings.ego.response_time == pytest.approx(2 / 15)
+    assert make("highway-v0", params=(slow, slow)).settings.table.ego.response_time == pytest.approx(2 / 15)
 
 
 def test_response_times_are_rounded_up_to_whole_frames():
     fields = PRESETS["slides"].ego._asdict() | {"response_time": 0.31}
     env = make("highway-fast-v0", params=(RSSParams.validated(**fields), PRESETS["slides"].other))
-    assert env.settings.ego.response_time == pytest.approx(0.4)
-    assert env.settings.other.response_time == pytest.approx(2.0)
+    assert env.settings.table.ego.response_time == pytest.approx(0.4)
+    assert env.settings.table.other.response_time == pytest.approx(2.0)
 
 
 def test_a_new_simulation_frequency_at_reset_is_taken_up():
     env = make_shielded()
     env.reset(seed=0, options={"config": {"simulation_frequency": 15}})
-    assert env.settings.dt == pytest.approx(1 / 15)
-    assert env.settings.ego.response_time == pytest.approx(2 / 15)
+    assert env.settings.table.dt == pytest.approx(1 / 15)
+    assert env.settings.table.ego.response_time == pytest.approx(2 / 15)
 
 
 def test_recorded_frames_must_be_asked_for():

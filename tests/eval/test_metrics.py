@@ -5,20 +5,22 @@ import pandas as pd
 import pytest
 from result_tables import episodes_of
 
-from rss_shield.eval.metrics import AT_FAULT, BLAMES, METRICS, differences, summarise, with_outcomes
-from rss_shield.shield.lanes import judge
+from rss_shield.eval.metrics import METRICS, differences, summarise, with_outcomes
+from rss_shield.eval.rollout import RISK
+from rss_shield.shield.verdicts import BLAMES, VERDICTS
 
 # (blame, crashed, simulator's own meaning): the six things that can happen
-OF_A_GOAL = {"success", "time_to_goal"}
-MEASURED = {"frozen", "near_misses", "impact", "impact_delta_v", "min_thw", "max_drac", "min_pet"} | {
+OF_A_GOAL = ("success", "time_to_goal")
+MEASURED = (
+    *("frozen", "near_misses", "impact", "impact_delta_v", "min_thw_ahead", "max_drac_ahead", "min_pet"),
     *("violation_ego", "violation_other", "shield_time"),
-}
+)
+ALWAYS = [metric.name for metric in METRICS if metric.name not in (*OF_A_GOAL, *RISK, *MEASURED)]
 OUTCOMES = ["", "ego", "both", "other", "inherited", "none"]
 
 
-def test_the_words_are_those_of_the_judge():
-    assert set(BLAMES) == set(judge.VERDICTS)
-    assert AT_FAULT == judge.AT_FAULT
+def test_tables_show_every_verdict_once():
+    assert sorted(BLAMES) == sorted(VERDICTS)
 
 
 def test_every_crash_has_exactly_one_outcome():
@@ -36,7 +38,7 @@ def test_a_crash_without_a_verdict_is_not_lost():
 
 def test_a_cell_is_summarised_by_hand_computed_values():
     summary = summarise(episodes_of(["ego", "both", "other", ""])).set_index("metric")
-    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in OF_A_GOAL | MEASURED]
+    assert list(summary.index) == ALWAYS
     expected = {
         "crash": 3 / 4,
         "at_fault": 2 / 4,
@@ -61,13 +63,21 @@ def test_a_cell_is_summarised_by_hand_computed_values():
     assert (summary["value"] <= summary["high"]).all()
 
 
+def test_risk_is_summarised_where_it_was_measured():
+    episodes = episodes_of([""] * 4).assign(max_rdsi=[0.5, 0.7, 0.9, 4.0], time_known_unsafe=[0.0, 0.0, 1.0, 3.0])
+    summary = summarise(episodes).set_index("metric")
+    assert list(summary.index) == [*ALWAYS, "max_rdsi", "time_known_unsafe"]
+    assert summary.loc["max_rdsi", "value"] == pytest.approx(0.8)  # median
+    assert summary.loc["time_known_unsafe", "value"] == 1.0  # mean
+
+
 def crossings_of(times: list[float], successes: list[bool], test: str = "off") -> pd.DataFrame:
     return episodes_of([""] * len(times), test=test).assign(time=times, success=successes)
 
 
 def test_the_time_to_the_goal_is_that_of_the_episodes_that_reach_it():
     summary = summarise(crossings_of([6.0, 13.0, 8.0, 13.0], [True, False, True, False])).set_index("metric")
-    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in MEASURED]
+    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in RISK]
     assert summary.loc["success", ["value", "n"]].tolist() == [0.5, 4]
     assert summary.loc["time_to_goal", ["value", "n"]].tolist() == [7.0, 2]  # mean of 6 and 8
 
@@ -90,7 +100,7 @@ def test_times_to_the_goal_are_compared_where_both_reach_it():
 def test_cells_keep_their_order_and_the_same_episodes_give_the_same_summary():
     episodes = pd.concat([episodes_of(["ego"] * 5, "on", "off"), episodes_of([""] * 5, "off", "on")])
     first, second = summarise(episodes), summarise(episodes)
-    assert list(zip(first["train"], first["test"], strict=True))[:: len(METRICS) - len(OF_A_GOAL | MEASURED)] == [
+    assert list(zip(first["train"], first["test"], strict=True))[:: len(ALWAYS)] == [
         ("on", "off"),
         ("off", "on"),
     ]

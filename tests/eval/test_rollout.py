@@ -9,7 +9,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 import rss_shield
-from rss_shield.eval.rollout import evaluate, run_episode
+from rss_shield.eval.rollout import MOST_DRAC, RISK, evaluate, run_episode
 from tests.fake_env import BRAKE, FakeEnv, FakeEnvWithGoal, brake, go, untouched_vec
 
 
@@ -32,6 +32,15 @@ def test_a_crash_is_recorded_with_its_numbers():
         "broken_duties": 1,
         "min_ttc": 96.0,
     }
+
+
+def test_risk_is_recorded_where_it_is_measured():
+    env = rss_shield.make("highway-fast-v0", "monitor", risk=True, max_episode_steps=3)
+    record = run_episode(lambda: env, lambda _: 3, seed=0)
+    assert set(RISK) <= set(record)
+    assert record["time_known_safe"] + record["time_unknown"] + record["time_known_unsafe"] == pytest.approx(3.0)
+    assert record["max_rdsi"] > 0.0 and record["max_drac"] <= MOST_DRAC
+    assert not set(RISK) & set(run_episode(FakeEnv, go, seed=6))
 
 
 def test_a_contact_that_the_simulator_does_not_flag_is_a_crash():

@@ -9,9 +9,10 @@ import rss_shield
 from rss_shield.envs.fast.config import compile_scenario
 from rss_shield.envs.fast.draws import generator_state
 from rss_shield.envs.fast.engine import DISABLED, Engine
-from rss_shield.envs.fast.infos import info_of, step_infos
+from rss_shield.envs.fast.infos import step_infos
 from rss_shield.envs.fast.state import OBSTACLE, TRAFFIC
 from rss_shield.envs.stock import drivers_unchanged
+from rss_shield.shield.tally import info_at
 
 _NEAREST = ("shield.partner", "shield.min_margin_lon", "shield.min_margin_lat")
 POLICIES = ("random", "faster", "slower")
@@ -159,7 +160,7 @@ def _compare_observation(seen, out, worst) -> None:
 
 
 def _compare_info(info, infos, where, discrete) -> None:
-    ours = info_of(infos, 0)
+    ours = info_at(infos, 0)
     theirs = {key: info[key] for key in ours}
     theirs["shield"] = {key: info["shield"][key] for key in ours["shield"]}
     margins = [max(i["shield"]["min_margin_lon"], i["shield"]["min_margin_lat"]) for i in (ours, theirs)]

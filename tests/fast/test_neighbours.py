@@ -12,7 +12,7 @@ from rss_shield.envs.fast.neighbours import Distances, Past, make_past, measure,
 from rss_shield.envs.options import Settings
 from rss_shield.shield.lanes.controller import find_danger
 from rss_shield.shield.lanes.memory import MEMORY
-from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.params import PRESETS, Rules, Table
 
 DT = 0.2
 FRAMES = 8
@@ -35,10 +35,7 @@ def _look(cars, episode, net, sight, frames, past, boxes, settings, chosen, limi
         past.ego[row_before(episode)],
         sight.users_before,
         past.memory,
-        settings.ego,
-        settings.other,
-        settings.rules,
-        settings.dt,
+        settings.table,
         past.near[: episode.near],
         nearest,
         soonest,
@@ -53,7 +50,7 @@ class Shield:
         self.engine, self.settings = engine, settings
         self.episode = engine.batch.episodes[0].copy()
         self.past = Past(*(array[0] for array in make_past(1, engine.batch.cars.shape[1])))
-        self.watch = make_watch(settings.rules.heading_bound)
+        self.watch = make_watch(settings.table.rules.heading_bound)
         _start(self.episode, self.past, np.zeros(1, MEMORY))
 
     def look(self, everybody, limit, nearest, soonest):
@@ -93,7 +90,7 @@ def move(cars, lanes, rng):
 
 def play(env_id, rules, scenes, measured_up_to=None):
     """Two shields, one of which measures everybody, on random scenes: (differences, shares measured by the other)."""
-    settings = Settings(*PRESETS["simulator"][:2], rules, False, DT)
+    settings = Settings(Table(*PRESETS["simulator"][:2], rules, DT), False)
     engine = Engine(compile_scenario(env_id, None), 1, settings)
     engine.seed([0])
     engine.reset()

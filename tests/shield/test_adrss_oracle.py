@@ -28,7 +28,7 @@ from rss_shield.shield.definitions.longitudinal import (
 from rss_shield.shield.definitions.response import LAT, lateral_response
 from rss_shield.shield.lanes.memory import MEMORY, owes_braking, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
-from rss_shield.shield.params import PRESETS, RSSParams, Rules
+from rss_shield.shield.params import PRESETS, RSSParams, Rules, Table
 
 structured, positions = rss.structured, rss.core
 PRECISION = 1e-3
@@ -212,7 +212,7 @@ def test_behind_a_cut_in_nobody_brakes_there_but_the_ego_does_here():
     for time, gap in ((1, 9.0), (2, 0.5)):
         lon, right = judged(checker, time, ego, other, (BEHIND, 20.0), (ON_THE_LEFT, gap))
         users[1]["y"] = 2.0 + gap
-        pair = assess(users[0], users[1], CAR, CAR, Rules(), 1 / 15)
+        pair = assess(users[0], users[1], Table(CAR, CAR, Rules(), 1 / 15))
         remember(memory, pair, users[0], users[1], 1 / 15)
     assert not lon.is_safe and not right.is_safe
     assert lon.response == getattr(rss.state.LongitudinalResponse, "None")

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from adversary import play, world
 
-from rss_shield.shield.definitions.kinematics import frames_for
 from rss_shield.shield.lanes.anticipation import (
     ROOM,
     acceleration_cap,
@@ -16,7 +15,8 @@ from rss_shield.shield.lanes.anticipation import (
 from rss_shield.shield.lanes.controller import find_danger
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
-from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.params import PRESETS, Rules, Table
+from rss_shield.shield.sampling import frames_for
 
 DTS = (1 / 30, 1 / 20, 1 / 15, 1 / 10, 1 / 5)
 ROUND = PRESETS["slides"].ego._replace(  # numbers to reckon with by hand
@@ -95,9 +95,9 @@ def worst_next_margins(n, more=0.0, deaf=False, seed=0):
             lead["speed"] = 0.0
             turned(lead, 0.0)
         lead["s"] = 1e-3
-        margin = assess(ego, lead, rear, front, rules, dt).margin_lon
+        margin = assess(ego, lead, Table(rear, front, rules, dt)).margin_lon
         lead["s"] += -margin + abs(rng.choice([rng.normal(0, 0.1), rng.uniform(0, 20)]))
-        pair = assess(ego, lead, rear, front, rules, dt)
+        pair = assess(ego, lead, Table(rear, front, rules, dt))
         if not (pair.safe_lon and pair.ego_is_rear):
             continue
         done += 1
@@ -113,7 +113,7 @@ def worst_next_margins(n, more=0.0, deaf=False, seed=0):
         command = max(min(rear.a_max_accel, cap, max(rear.v_cap - v, 0.0) / dt), -v / dt)
         ego["s"], lead["s"] = ego["s"] + v * dt, lead["s"] + lead["along"] * dt
         ego["speed"], lead["speed"] = v + command * dt, lead["speed"] + a * dt
-        after = assess(turned(ego, 0.0), turned(lead, lead["heading"]), rear, front, rules, dt)
+        after = assess(turned(ego, 0.0), turned(lead, lead["heading"]), Table(rear, front, rules, dt))
         credit = speed_cap_credit(v, rear)  # near its highest speed, all the ego can do is brake
         if pair.margin_lon >= credit:
             kept = share_kept(pair.margin_lon - credit, rules.anticipation, dt)
@@ -145,15 +145,15 @@ def test_a_neighbour_that_goes_on_as_it_does_makes_no_pair_dangerous_that_stoppi
         side = rng.choice([-1.0, 1.0])
         ego, other = car(rng, 0.0, 0.0, 20.0, side * rng.uniform(-0.02, 0.1)), car(rng, 0.5, side, 20.0, 0.0)
         turned(other, side * rng.choice([0.0, rng.uniform(-0.1, 0.05)]))
-        other["y"] -= side * (assess(ego, other, me, you, rules, dt).margin_lat - abs(rng.normal(0.0, 0.5)))
-        pair = assess(ego, other, me, you, rules, dt)
+        other["y"] -= side * (assess(ego, other, Table(me, you, rules, dt)).margin_lat - abs(rng.normal(0.0, 0.5)))
+        pair = assess(ego, other, Table(me, you, rules, dt))
         if not pair.safe_lat or pair.side != side:
             continue
         limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, me, rules.anticipation, dt)
         assert limit >= 0.0
         ego["y"], other["y"] = ego["y"] + side * limit * dt, other["y"] + other["u"] * dt
         ego["speed"] = 20.0
-        after = assess(turned(ego, side * np.arcsin(min(limit / 20.0, 1.0))), other, me, you, rules, dt)
+        after = assess(turned(ego, side * np.arcsin(min(limit / 20.0, 1.0))), other, Table(me, you, rules, dt))
         kept = share_kept(pair.margin_lat, rules.anticipation, dt)
         assert limit == 0.0 or after.margin_lat >= kept - 1e-9
         saved += limit > 0.0
@@ -169,7 +169,7 @@ def test_who_is_farther_than_the_bound_leaves_full_throttle(preset):
         rules = Rules(anticipation=rng.choice([0.3, 2.0, 9.0]))
         ego = car(rng, 0.0, 0.0, rng.choice([0.0, rng.uniform(0.0, 45.0)]), 0.0)
         lead = car(rng, rng.uniform(5.0, 400.0), 0.0, rng.choice([0.0, rng.uniform(0.0, 45.0)]), 0.0)
-        pair = assess(ego, lead, rear, front, rules, dt)
+        pair = assess(ego, lead, Table(rear, front, rules, dt))
         within, horizon = farthest_bound(pair.v_ego, rear, front, rules.anticipation, dt)
         if pair.safe_lon and pair.margin_lon >= within + horizon * lead["speed"]:
             a = rng.choice([0.0, -front.a_max_brake])
@@ -198,12 +198,12 @@ def test_it_is_about_who_is_ahead_in_the_way_and_who_is_beside(s, y, capped):
     for user in (ego, other):
         user["half_length"], user["half_width"] = 2.5, 1.0
     if s:  # half a metre to spare
-        other["s"] += s * (0.5 - assess(ego, other, rear, front, Rules(), dt).margin_lon)
+        other["s"] += s * (0.5 - assess(ego, other, Table(rear, front, Rules(), dt)).margin_lon)
     else:  # nothing
-        other["y"] -= np.sign(y) * (assess(ego, other, rear, front, Rules(), dt).margin_lat - 1e-9)
+        other["y"] -= np.sign(y) * (assess(ego, other, Table(rear, front, Rules(), dt)).margin_lat - 1e-9)
     users, last = np.array([other], ROAD_USER), np.zeros(1, ROAD_USER)
     on, off = (
-        find_danger(ego, users, last[0], last, np.zeros(1, MEMORY), rear, front, Rules(anticipation=rate), dt)
+        find_danger(ego, users, last[0], last, np.zeros(1, MEMORY), Table(rear, front, Rules(anticipation=rate), dt))
         for rate in (2.0, 0.0)
     )
     assert {name for name in on.bounds._fields if getattr(on.eased, name) != getattr(on.bounds, name)} == capped
@@ -213,7 +213,7 @@ def test_it_is_about_who_is_ahead_in_the_way_and_who_is_beside(s, y, capped):
 @pytest.mark.parametrize("dt", [1 / 15, 1 / 5])
 @pytest.mark.parametrize("others", [1, 2], ids=["pairs", "triples"])
 def test_with_anticipation_adversaries_inside_the_bounds_never_touch(others, dt):
-    w = world(dt=dt, frames=120, bare=dt == 1 / 5, others=others, table=dict(anticipation=2.0))
+    w = world(dt=dt, frames=120, bare=dt == 1 / 5, others=others, published=dict(anticipation=2.0))
     episodes = play(3000, w, seed=3)
     assert (episodes["contact"] == -1).all()
     assert episodes["broken"].sum() == 0

@@ -9,7 +9,7 @@ import collections
 import pytest
 from adversary import play, world
 
-from rss_shield.shield.lanes.judge import VERDICTS
+from rss_shield.shield.verdicts import VERDICTS
 
 WORLDS = [(dt, bare) for dt in (1 / 15, 1 / 5) for bare in (False, True)]
 

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from rss_shield.shield.definitions.lateral import approach_no_credit, d_min_lateral, lateral_euler_margin
+from rss_shield.shield.definitions.lateral import approach_no_credit, d_min_lateral
 from rss_shield.shield.definitions.response import lateral_response, lateral_speed_limit
 from rss_shield.shield.params import PRESETS
+from rss_shield.shield.sampling import lateral_euler_margin
 
 # rho 1 s, lateral acceleration 0.2, lateral braking 0.8 m/s^2
 CAR = PRESETS["slides"].ego

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from rss_shield.shield.definitions.kinematics import reach
-from rss_shield.shield.definitions.lateral import d_min_lateral, lateral_euler_margin
-from rss_shield.shield.definitions.longitudinal import d_min_same_direction, euler_margin
+from rss_shield.shield.definitions.lateral import d_min_lateral
+from rss_shield.shield.definitions.longitudinal import d_min_same_direction
 from rss_shield.shield.params import PRESETS
+from rss_shield.shield.sampling import euler_margin, lateral_euler_margin
 
 DT = 1 / 15
 # acceleration 3.5, braking 4 against 8 m/s^2, no speed cap

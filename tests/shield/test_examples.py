@@ -20,7 +20,6 @@ from rss_shield.shield.definitions.longitudinal import (
     d_min_longitudinal,
     d_min_opposite_direction,
     d_min_same_direction,
-    euler_margin,
     is_safe_longitudinally,
 )
 from rss_shield.shield.definitions.occlusion import is_exonerated_by_mean_speed, mean_speed_until_contact, v_visible
@@ -70,10 +69,12 @@ from rss_shield.shield.definitions.unstructured import (
     trajectory,
 )
 from rss_shield.shield.geometry import half_extents, locate, make_road
-from rss_shield.shield.lanes.judge import VERDICTS, judge_contact, judge_frame
+from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.memory import MEMORY, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
-from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.params import PRESETS, Rules, Table
+from rss_shield.shield.sampling import euler_margin
+from rss_shield.shield.verdicts import VERDICTS
 
 EXAMPLES = json.loads((DATA / "rss-examples.json").read_text())
 
@@ -407,7 +408,7 @@ def def27_blame(scenario):
 def drive_to_contact(extra, b_front, a_rear, b_rear, ego_is_rear, dt=0.01):
     """Two cars in one lane at 20 m/s, each frame at the speed at its start. Who is blamed when they touch?"""
     rules = Rules(discretisation_margin=False, overlap_margin=0.0, heading_bound=0.0)
-    cars = np.zeros(2, ROAD_USER)
+    table, cars = Table(CAR, CAR, rules, dt), np.zeros(2, ROAD_USER)
     cars["half_length"], cars["half_width"], cars["in_own_lane"] = 2.5, 1.0, True
     cars["speed"] = cars["along"] = 20.0
     cars["cos"] = 1.0
@@ -420,16 +421,16 @@ def drive_to_contact(extra, b_front, a_rear, b_rear, ego_is_rear, dt=0.01):
         gap = front["s"] - rear["s"] - 5.0
         smallest = min(smallest, gap)
         if gap < -1e-9:
-            verdict = VERDICTS[judge_contact(ego, users[0], memory[0], CAR, CAR, rules, dt).verdict]
+            verdict = VERDICTS[judge_contact(ego, users[0], memory[0], table).verdict]
             ego_name, other_name = ("rear", "front") if ego_is_rear else ("front", "rear")
             blamed = {"none": [], "ego": [ego_name], "other": [other_name], "both": ["front", "rear"]}[verdict]
             return {"collision": True, "t": frame * dt, "t_b": t_b, "blamed": blamed}
-        remember(memory[0], assess(ego, users[0], CAR, CAR, rules, dt), ego, users[0], dt)
+        remember(memory[0], assess(ego, users[0], table), ego, users[0], dt)
         t_b = frame * dt if memory[0]["since"] == 0 else t_b
         # the last step of braking is partial: nobody reverses
         a_front = max(-b_front, -front["speed"] / dt)
         a_rear_now = max(a_rear if frame * dt < CAR.response_time else -b_rear, -rear["speed"] / dt)
-        judge_frame(ego, users, memory, Command(a_rear_now if ego_is_rear else a_front, 0.0), 0.0, CAR, CAR, dt)
+        judge_frame(ego, users, memory, Command(a_rear_now if ego_is_rear else a_front, 0.0), 0.0, table)
         for one, a in ((rear, a_rear_now), (front, a_front)):
             one["along"] = one["speed"]
             one["s"] += one["speed"] * dt

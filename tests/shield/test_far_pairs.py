@@ -8,7 +8,7 @@ from rss_shield.shield.lanes.anticipation import acceleration_cap, lateral_cap
 from rss_shield.shield.lanes.controller import find_danger
 from rss_shield.shield.lanes.memory import MEMORY, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess, leading_speed, least_cosine, least_margin, own_share
-from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.params import PRESETS, Rules, Table
 
 DT = 0.2
 SIMULATOR = PRESETS["simulator"]
@@ -28,7 +28,7 @@ def anybody(rng):
     return user
 
 
-def bound_on(ego, user, ego_params, other_params, rules):
+def bound_on(ego, user, table):
     """`least_margin` of a pair."""
     return least_margin(
         user["s"] - ego["s"],
@@ -36,26 +36,24 @@ def bound_on(ego, user, ego_params, other_params, rules):
         user["speed"],
         user["cos"],
         user["wreck"],
-        own_share(ego["speed"], ego["cos"], ego_params, DT),
-        leading_speed(ego, rules),
-        least_cosine(rules),
-        ego_params,
-        other_params,
-        DT,
+        own_share(ego["speed"], ego["cos"], table.ego, DT),
+        leading_speed(ego, table.rules),
+        least_cosine(table.rules),
+        table,
     )
 
 
 @pytest.mark.parametrize("preset", ["simulator", "slides", "rodionova-conservative"])
 def test_the_quick_bound_is_never_above_the_margin(preset):
     rng = np.random.default_rng(0)
-    ego_params, other_params = PRESETS[preset][:2]
     known = 0
     for rules in (Rules(), Rules(heading_bound=1.0), Rules(discretisation_margin=False)):
         for _ in range(4000):
             ego, user = anybody(rng), anybody(rng)
             ego["wreck"] = False
-            bound = bound_on(ego, user, ego_params, other_params, rules)
-            pair = assess(ego, user, ego_params, other_params, rules, DT)
+            table = Table(*PRESETS[preset][:2], rules, DT)
+            bound = bound_on(ego, user, table)
+            pair = assess(ego, user, table)
             assert bound <= pair.margin_lon + 1e-9
             assert pair.safe_lon or not bound > 1e-6
             known += bound > 0.0
@@ -68,8 +66,8 @@ def test_a_quick_bound_without_the_response_time_would_be_caught():
     wrong = 0
     for _ in range(2000):
         ego, user = anybody(rng), anybody(rng)
-        bound = bound_on(ego, user, hasty, SIMULATOR.other, Rules())
-        wrong += bound > assess(ego, user, SIMULATOR.ego, SIMULATOR.other, Rules(), DT).margin_lon + 1e-9
+        bound = bound_on(ego, user, Table(hasty, SIMULATOR.other, Rules(), DT))
+        wrong += bound > assess(ego, user, Table(SIMULATOR.ego, SIMULATOR.other, Rules(), DT)).margin_lon + 1e-9
     assert wrong > 10
 
 
@@ -108,33 +106,33 @@ def test_memory_and_report_are_those_of_a_look_at_everybody(env_id):
 
 def caps_of(pair, memory, settings):
     """What anticipation of one safe pair leaves: acceleration, lateral speed to the left and to the right."""
-    ego_params, other_params, rules, _, dt = settings[:5]
+    table = settings.table
     cap = left = right = np.inf
     if pair.safe_lon and not pair.safe_lat and pair.ego_is_rear and not pair.opposite and pair.v_other >= 0.0:
         seen = pair.gap_lon, pair.margin_lon, pair.v_ego, pair.v_other, memory["acceleration_other"]
-        cap = acceleration_cap(*seen, ego_params, other_params, rules.anticipation, dt)
+        cap = acceleration_cap(*seen, table.ego, table.other, table.rules.anticipation, table.dt)
     if pair.safe_lat and not pair.safe_lon:
-        limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, ego_params, rules.anticipation, dt)
+        limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, table.ego, table.rules.anticipation, table.dt)
         left, right = (left, limit) if pair.side > 0.0 else (limit, right)
     return cap, left, right
 
 
 def replay(frames, settings):
     """What `find_danger` remembers and reports over a log, and what a look at every pair gives."""
-    ego_params, other_params, rules, _, dt = settings[:5]
+    table = settings.table
     count = len(frames[0].users)
     memory, thorough = np.zeros(count, MEMORY), np.zeros(count, MEMORY)
     last = np.zeros(count + 1, ROAD_USER)
     quick, full = [], []
     for frame in frames:
-        report = find_danger(frame.ego, frame.users, last[-1], last[:-1], memory, *settings[:3], dt)
+        report = find_danger(frame.ego, frame.users, last[-1], last[:-1], memory, table)
         quick.append((memory.copy(), report))
         nearest, ttc = (np.inf, np.inf), np.inf
         bounds = report.bounds
         caps = [bounds.a_upper, bounds.left, bounds.right]
         for i, user in enumerate(frame.users):
-            pair = assess(frame.ego, user, ego_params, other_params, rules, dt)
-            remember(thorough[i], pair, frame.ego, user, dt)
+            pair = assess(frame.ego, user, table)
+            remember(thorough[i], pair, frame.ego, user, table.dt)
             if max(pair.margin_lon, pair.margin_lat) < max(nearest):
                 nearest = pair.margin_lon, pair.margin_lat
             if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
@@ -155,8 +153,8 @@ def test_who_is_of_no_interest_changes_nothing_else():
         for frame in env.frames:
             common = frame.ego, frame.users, last[-1], last[:-1]
             limits = rng.uniform(-2.0, 8.0), rng.uniform(0.0, 20.0)
-            free = find_danger(*common, memory, *env.settings[:3], DT)
-            found = find_danger(*common, bounded, *env.settings[:3], DT, None, *limits)
+            free = find_danger(*common, memory, env.settings.table)
+            found = find_danger(*common, bounded, env.settings.table, None, *limits)
             margins = free.margin_lon, free.margin_lat
             if max(margins) < limits[0]:
                 nearer += 1

@@ -22,6 +22,7 @@ for mode in ("monitor", "override"):
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     for _ in range(60):
+        env.action_masks()
         env.step(rng.integers(env.single_action_space.n, size=16))
 env.engine.batch.episodes["ego"] = -1
 try:

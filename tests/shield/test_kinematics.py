@@ -7,7 +7,6 @@ import pytest
 
 from rss_shield.shield.definitions.kinematics import (
     forward_reach,
-    frames_for,
     reach,
     response_distance,
     speed_after_response,
@@ -19,6 +18,7 @@ from rss_shield.shield.definitions.kinematics import (
     time_to_stop,
     travel,
 )
+from rss_shield.shield.sampling import frames_for
 
 NO_CAP = math.inf
 

@@ -32,16 +32,16 @@ def test_a_leader_is_measured_bumper_to_bumper():
     # centres 45 m apart, boxes 5 m long: a gap of 40 m; 20 m/s behind 12 m/s
     # THW 40 / 20 = 2 s, TTC 40 / 8 = 5 s, DRAC 8^2 / (2 40) = 0.8 m/s^2
     now = measured((45, 0.5, 0, 12), (0, 0, 0, 20))
-    assert now.min_thw == pytest.approx(2.0)
+    assert now.min_thw_ahead == pytest.approx(2.0)
     assert now.min_ttc_ahead == pytest.approx(5.0)
-    assert now.max_drac == pytest.approx(0.8)
+    assert now.max_drac_ahead == pytest.approx(0.8)
     assert now.near_misses == 0
 
 
 def test_the_heading_of_the_ego_is_ahead():
     # the same, turned by 90 degrees
     now = measured((0, 45, math.pi / 2, 12), (0, 0, math.pi / 2, 20))
-    assert now.min_thw == pytest.approx(2.0) and now.min_ttc_ahead == pytest.approx(5.0)
+    assert now.min_thw_ahead == pytest.approx(2.0) and now.min_ttc_ahead == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("other", [(45, 2.1, 0, 12), (-45, 0, 0, 30), (45, -2.1, 0, 12)])
@@ -51,7 +51,7 @@ def test_who_is_beside_the_way_or_behind_is_not_ahead(other):
 
 def test_a_leader_that_drives_away_needs_no_braking():
     now = measured((45, 0, 0, 25), (0, 0, 0, 20))
-    assert now.max_drac == 0.0 and now.min_ttc_ahead == LONGEST
+    assert now.max_drac_ahead == 0.0 and now.min_ttc_ahead == LONGEST
 
 
 def test_a_near_miss_is_counted_when_it_begins():
@@ -93,7 +93,7 @@ def drive(order):
 @pytest.mark.parametrize("order", ["ego first", "other first"])
 def test_the_post_encroachment_time_is_from_leaving_to_coming(order):
     # Both centres are 30 m = 3 s apart at the crossing. The first one's rear leaves the strip of the second, 1 m beyond
-    # the middle, with its centre at 1 + 2.5 m; the second's front comes to the strip of the first, 1 m before the middle,
+    # the middle, with its centre at 1 + 2.5 m; the second's front comes to the strip of the first, 1 m before it,
     # with its centre at -3.5 m: 3 s less the 7 m in between are 2.3 s. Squares are 1 m, so 0.2 s on either side.
     assert drive(order) == pytest.approx(2.3, abs=0.25)
 

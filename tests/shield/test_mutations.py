@@ -29,7 +29,7 @@ MUTATIONS = {
     "C1 and C1y no always-on limits": (dict(rules=dict(limits=False)), FAST, 1, "contact"),
     "C2 one frame of latency": (dict(latency=1), FAST, 1, "contact"),
     "C3 a P controller for a brake": (dict(soft_brake=True), FAST, 1, "contact"),
-    "C5 no margins for frames": (dict(table=dict(discretisation_margin=False)), FAST, 1, "contact"),
+    "C5 no margins for frames": (dict(published=dict(discretisation_margin=False)), FAST, 1, "contact"),
     "C6 started in danger": (dict(start_safe=False), FAST, 1, "contact"),
     "C7 which axis was safe is forgotten": (dict(rules=dict(memory=False, **LETTER)), SLOW, 1, "contact"),
     "C7 memory wiped on every frame": (dict(forgetful=True), SLOW, 1, "contact"),
@@ -50,7 +50,7 @@ def test_without_it_the_adversaries_get_through(change, dt, others, symptom):
     seen = {
         "contact": (episodes["contact"] >= 0).sum(),
         "broken": (episodes["broken"] > 0).sum(),
-        "heading": (episodes["heading"] > 2 * np.arcsin(w.table.heading_bound)).sum(),
+        "heading": (episodes["heading"] > 2 * np.arcsin(w.published.heading_bound)).sum(),
     }
     assert seen[symptom] > 0
 

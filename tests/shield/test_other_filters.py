@@ -22,12 +22,13 @@ from rss_shield.shield.filters.once_per_decision import is_dangerous
 from rss_shield.shield.lanes.controller import Body, always_on, find_danger
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
-from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.params import PRESETS, Rules, Table
 
 DT = 0.2
 CAR = PRESETS["simulator"].ego._replace(response_time=0.2)  # accelerates at 3, brakes at 5 to 6 m/s^2
 OTHER = PRESETS["simulator"].other
 RULES = Rules(take_back=False, anticipation=0.0)
+TABLE = Table(CAR, OTHER, RULES, DT)
 BODY = Body(2.5, 0.5, 0.0)
 
 
@@ -44,10 +45,10 @@ def cars(*fields):
 
 def filtered(kind, ego, users, wish, answers=False, begins=True, offset=0.0, threshold=None):
     memory = np.zeros(len(users), MEMORY)
-    danger = find_danger(ego, users, ego, users, memory, CAR, OTHER, RULES, DT)
+    danger = find_danger(ego, users, ego, users, memory, TABLE)
     chosen = Filter(kind, THRESHOLDS.get(kind, 0.0) if threshold is None else threshold)
     traffic = Traffic(ego, users, memory, offset, None)
-    return answer(chosen, wish, traffic, danger.free, answers, begins, BODY, CAR, OTHER, RULES, DT)
+    return answer(chosen, wish, traffic, danger.free, answers, begins, BODY, TABLE)
 
 
 # ---------------------------------------------------------------- the leader
@@ -166,7 +167,7 @@ PRINTED = 4.0 + 0.06 + 42.436 - 400.0 / 12.0 + 1.0
 def test_printed_distances_have_no_margins(more, dangerous):
     (ego,) = cars({"speed": 20.0})
     users = cars({"s": PRINTED + 5.0 + more, "speed": 20.0})
-    assert is_dangerous(ego, users, CAR, OTHER, DT) == dangerous
+    assert is_dangerous(ego, users, TABLE) == dangerous
     response, answers = filtered(PRINTED_DEF_10, ego, users, Command(2.0, 0.0))
     assert answers == response.overridden == dangerous
     assert response.command.acceleration == (-5.0 if dangerous else 2.0)

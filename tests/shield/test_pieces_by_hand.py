@@ -15,10 +15,11 @@ from rss_shield.shield.geometry import make_road
 from rss_shield.shield.junctions.plans import THREAT, farthest, fastest, nearest
 from rss_shield.shield.lanes.controller import always_on
 from rss_shield.shield.lanes.frame import to_lane_frame
-from rss_shield.shield.lanes.judge import EGO, INHERITED, TOO_WEAK, judge_contact
+from rss_shield.shield.lanes.judge import judge_contact
 from rss_shield.shield.lanes.memory import MEMORY, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, toward
-from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.params import PRESETS, Rules, Table
+from rss_shield.shield.verdicts import EGO, INHERITED, TOO_WEAK
 
 CAR = PRESETS["simulator"].ego  # accelerates at 3, brakes at 5 to 6 m/s^2; lateral 1 and 1.5; at most 40 m/s
 DT = 0.2
@@ -146,14 +147,14 @@ def test_danger_from_the_start_is_the_egos_fault_where_it_did_not_answer(broke, 
     memory["half_length_ego"] = memory["half_length_other"] = 2.5
     memory["v_ego"] = 20.0  # its share: farther than it has got
     ego, other = user(speed=5.0), user(s=5.5)
-    assert judge_contact(ego, other, memory, CAR, CAR, Rules(), DT).verdict == verdict
+    assert judge_contact(ego, other, memory, Table(CAR, CAR, Rules(), DT)).verdict == verdict
 
 
 def shielded(network, position, heading=0.0, speed=20.0):
     road = Road(network, np_random=np.random.default_rng(0))
     vehicle = MDPVehicle(road, position, heading=heading, speed=speed)
     road.vehicles.append(vehicle)
-    return road, ShieldedEgo(vehicle, Settings(CAR, PRESETS["simulator"].other, Rules(), True, 1 / 15))
+    return road, ShieldedEgo(vehicle, Settings(Table(CAR, PRESETS["simulator"].other, Rules(), 1 / 15), True))
 
 
 @pytest.mark.parametrize("lanes", [2, 3, 4])

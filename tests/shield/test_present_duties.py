@@ -9,10 +9,11 @@ from highway_env.vehicle.kinematics import Vehicle
 from rss_shield import make
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.response import CORRECT, FRONT, LAT, LON, REAR
-from rss_shield.shield.lanes.judge import KEPT, TOO_WEAK, TOWARD, VERDICTS, audit_command
+from rss_shield.shield.lanes.judge import audit_command
 from rss_shield.shield.lanes.memory import MEMORY, Bounds, merge, owes_braking, owes_no_approach, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, Pair
 from rss_shield.shield.params import PRESETS, Rules
+from rss_shield.shield.verdicts import KEPT, TOO_WEAK, TOWARD, VERDICTS
 
 DT = 0.1
 CAR = PRESETS["slides"].ego._replace(response_time=0.3)  # brakes 4 to 8; lateral 0.2 and 0.8 m/s^2

@@ -21,7 +21,7 @@ def test_started_safe_and_among_the_lawful_nobody_is_touched(others, dt, bare):
     episodes = play(EPISODES, w, seed=1)
     assert (episodes["contact"] == -1).all()
     assert episodes["broken"].sum() == 0, "the ego broke a duty"
-    assert episodes["heading"].max() <= np.arcsin(w.table.heading_bound) + 1e-9
+    assert episodes["heading"].max() <= np.arcsin(w.published.heading_bound) + 1e-9
     # nobody was tame
     assert (episodes["overridden"] > 0).mean() > 0.4
     assert (episodes["danger_lon"] > 0).mean() > 0.1

@@ -8,7 +8,7 @@ from examples import CASES, EXAMPLES, MODES, rounded
 from highway_env.vehicle.behavior import IDMVehicle
 
 from rss_shield import MultiAgentShield, ShieldWrapper, make
-from rss_shield.envs.highway.risk import _line
+from rss_shield.envs.roads.lines import line_beside
 from rss_shield.shield.risk import STATES, RiskSettings, band_risk
 
 EPISODE = (
@@ -109,7 +109,7 @@ def test_infos_sum_up_the_frames_of_the_episode(env_id):
             assert info["risk"]["total"] == max(frame.total for frame in step)
             assert info["risk"]["thw"] == min(frame.thw for frame in step)
         times, rdsi, lower, upper, states = np.array(env.risk_frames)[:, :5].T
-        dt = env.settings.dt
+        dt = env.settings.table.dt
         assert np.diff(times) == pytest.approx(dt)
         assert info["max_rdsi"] == max(frame.largest for frame in env.risk_frames) >= rdsi.max() > 0.0
         assert info["max_total_rdsi"] == max(frame.total for frame in env.risk_frames)
@@ -152,7 +152,8 @@ def test_lines_are_read_from_both_lanes_that_they_part(lane, sides):
     vehicle = env.unwrapped.vehicle
     vehicle.lane_index = (*vehicle.lane_index[:2], lane)
     vehicle.lane = vehicle.road.network.get_lane(vehicle.lane_index)
-    assert (_line(vehicle, -1), _line(vehicle, 1)) == sides
+    network, lane = vehicle.road.network, vehicle.lane_index
+    assert (line_beside(network, lane, -1), line_beside(network, lane, 1)) == sides
 
 
 @pytest.mark.parametrize("risk", ["yes", 1, None])

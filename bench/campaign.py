@@ -1,0 +1,122 @@
+"""Every arm on two roads, with many seeds: what the pages about agents are written from.
+
+    python bench/campaign.py                 begin, or go on: what is finished is not repeated (hours to days)
+    python bench/campaign.py --list          what it consists of, and what is done
+    python bench/campaign.py --divide 1000 -- --n-envs 2 --replay-episodes 0     try the whole chain
+    python bench/campaign.py -- --workers 1  further options of train.py
+
+Each part is a run of train.py, in `runs/campaign-PART`. Kill it whenever you like; a model, a test or a replay that is
+there is kept, and a training goes on from its last block. Agents of the intersection are tested for 30 s as well as for
+the 13 s of their training, and the frontier of each road is drawn from all of its parts.
+"""
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from rss_shield.eval.arms import ARMS
+
+ROOT = Path(__file__).parents[1]
+HIGHWAY, INTERSECTION = "highway-fast-v0", "intersection-v0"
+MAIN = ("unshielded", "shielded", "change-penalty-0.02", "adaptive-penalty", "maskable", "ppo-lagrangian")
+SCRIPTED = tuple(arm.name for arm in ARMS.values() if arm.scripted)
+PENALTIES = tuple(name for name in ARMS if "penalty-0" in name or name == "penalty-1")
+VARIANTS = ("reward-shaping", "adaptive-share", "proactive", "executed-action", "sailr")
+FILTERS = ("ttc", "distance-45m", "cbf", "limits", "literal-def10")  # along lanes only
+Q_LEARNERS = ("dqn", "dqn-shielded", "executed-action-dqn", "qr-dqn", "qr-dqn-shielded")
+CONTINUOUS = ("sac", "sac-replaced", "sac-projected")  # in the engine on motorways only
+LONG = 30  # [s] of an episode at the intersection
+
+
+class Part(NamedTuple):
+    """A run of train.py."""
+
+    name: str
+    env_id: str
+    arms: tuple[str, ...]
+    decisions: int
+    seeds: int
+    episodes: int = 1000
+
+
+OTHERS = tuple(name for name in (*PENALTIES, *VARIANTS) if name not in MAIN)
+PARTS = (
+    Part("highway-main", HIGHWAY, MAIN, 1_000_000, 10),
+    Part("highway-scripted", HIGHWAY, SCRIPTED, 1, 1),
+    Part("highway-others", HIGHWAY, (*OTHERS, *FILTERS), 1_000_000, 5),
+    Part("highway-off-policy", HIGHWAY, (*Q_LEARNERS, *CONTINUOUS), 200_000, 5),
+    Part("intersection-main", INTERSECTION, MAIN, 500_000, 10),
+    Part("intersection-scripted", INTERSECTION, SCRIPTED, 1, 1),
+    Part("intersection-others", INTERSECTION, OTHERS, 500_000, 5),
+    Part("intersection-off-policy", INTERSECTION, Q_LEARNERS, 200_000, 5),
+)
+
+
+def folder_of(part: Part, runs: Path) -> Path:
+    return runs / f"campaign-{part.name}"
+
+
+def is_done(part: Part, runs: Path) -> bool:
+    return (folder_of(part, runs) / "results.json").exists()
+
+
+def train(part: Part, runs: Path, divide: int, more: list[str]) -> None:
+    """Begin a part, or go on with it."""
+    folder = folder_of(part, runs)
+    seeds = range(part.seeds if divide == 1 else 1)
+    options = ["--env-id", part.env_id, "--arms", *part.arms, "--seeds", *map(str, seeds)]
+    options += ["--total-timesteps", str(max(part.decisions // divide, 1))]
+    options += ["--eval-episodes", str(max(part.episodes // divide, 1))]
+    options += ["--runs-dir", str(runs), "--name", folder.name, "--resume", *more]
+    call([str(ROOT / "train.py"), *options])
+
+
+def test_long(part: Part, runs: Path, divide: int) -> None:
+    """The agents of a part on longer episodes, each once."""
+    for model in sorted(folder_of(part, runs).glob("*/model.zip")):
+        out = model.parent / f"tested-{LONG}s"
+        if not (out / "table.md").exists():
+            count = str(max(part.episodes // divide, 1))
+            options = [str(model), "--config.duration", str(LONG), "--episodes", count, "--out", str(out)]
+            call(["-m", "rss_shield.test", *options])
+
+
+def call(arguments: list[str]) -> None:
+    """A Python process in the checkout; its failure is ours."""
+    print("+ python", *arguments, flush=True)
+    code = subprocess.run([sys.executable, *arguments]).returncode
+    if code:
+        sys.exit(code)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--list", action="store_true", help="show the parts and what is done, and stop")
+    parser.add_argument("--parts", nargs="+", choices=[part.name for part in PARTS], help="only these")
+    parser.add_argument("--runs-dir", type=Path, default=Path("runs"), help="folder of all runs (default: %(default)s)")
+    parser.add_argument("--divide", type=int, default=1, help="decisions and episodes by this number, and one seed")
+    parser.add_argument("more", nargs="*", metavar="-- OPTION", help="further options of train.py")
+    arguments = parser.parse_args()
+    if arguments.divide < 1:
+        parser.error(f"--divide {arguments.divide}: expected at least 1")
+    runs = arguments.runs_dir
+    chosen = [part for part in PARTS if arguments.parts is None or part.name in arguments.parts]
+    if arguments.list:
+        for part in chosen:
+            done = "done" if is_done(part, runs) else "to do"
+            print(f"{part.name}: {done}; {part.decisions} decisions, {part.seeds} seeds, {', '.join(part.arms)}")
+        return
+    for part in chosen:
+        if not is_done(part, runs):
+            train(part, runs, arguments.divide, arguments.more)
+        if part.env_id == INTERSECTION:
+            test_long(part, runs, arguments.divide)
+    for env_id in dict.fromkeys(part.env_id for part in chosen):
+        together = [str(folder_of(part, runs)) for part in chosen if part.env_id == env_id]
+        call(["-m", "rss_shield.eval.frontier", *together, "--out", together[0]])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+"""`rss-shield judge`: who was to blame in any log."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rss_shield.eval.files import atomic, write_json
+from rss_shield.eval.suite.judge.findings import json_of, pair_frames, text_of
+from rss_shield.eval.suite.judge.judgement import judge_trace
+from rss_shield.eval.suite.judge.trajectories import FORMATS, Format, read_csv, read_lanes, straight_lanes
+from rss_shield.shield.params import PRESETS, Preset
+from rss_shield.shield.trace import Lane, Trace, load
+
+
+def run(arguments: list[str] | None = None) -> None:
+    """Judge the files that the command line names."""
+    options = _parser().parse_args(arguments)
+    try:
+        for path in options.files:
+            _judge(path, options)
+    except (ValueError, FileNotFoundError, ModuleNotFoundError) as error:
+        sys.exit(f"rss-shield judge: {error}")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rss-shield judge", description="Who was in danger, who owed what and broke it, and who is to blame."
+    )
+    parser.add_argument(
+        "files", nargs="+", type=Path, help="a trace (.npz), trajectories (.csv) or a CommonRoad scenario (.xml)"
+    )
+    parser.add_argument("--params", help=f"preset to judge by: {', '.join(PRESETS)} (that of the trace, else slides)")
+    parser.add_argument("--response-time", type=float, help="of everybody, instead of the preset's [s]")
+    parser.add_argument("--ego", action="append", default=[], metavar="ID", help="judge from this user's view only")
+    parser.add_argument("--out", type=Path, help="folder for NAME.json, NAME.csv (pair-frames) and NAME.png")
+    parser.add_argument("--all-frames", action="store_true", help="safe pair-frames in the CSV, too")
+    csv = parser.add_argument_group("trajectories in CSV files")
+    csv.add_argument("--format", default="plain", help=f"columns: {', '.join(FORMATS)}")
+    csv.add_argument("--columns", default="", metavar="FIELD=NAME,...", help="other names: x=pos_x,t=time")
+    csv.add_argument("--units", default="", metavar="FIELD=UNIT,...", help="x=ft,speed=km/h,heading=deg")
+    csv.add_argument("--y", choices=("up", "down"), help="does y grow to the left of x (up), or to the right?")
+    csv.add_argument("--point", choices=("centre", "front", "corner"), help="what x and y are of")
+    csv.add_argument("--dt", type=float, help="interpolate positions to this step [s]")
+    csv.add_argument("--lanes", type=Path, help="JSON file with lanes")
+    csv.add_argument("--lanes-at", default="", metavar="Y,...", help="straight lanes along x with these middles [m]")
+    csv.add_argument("--lane-width", type=float, default=3.5, help="[m]")
+    return parser
+
+
+def _judge(path: Path, options: argparse.Namespace) -> None:
+    trace = read(path, options)
+    unknown = [name for name in options.ego if name not in trace.users.ids]
+    if unknown:
+        raise ValueError(f"--ego {unknown[0]}: expected one of {', '.join(trace.users.ids)}")
+    users = [trace.users.ids.index(name) for name in options.ego] or None
+    judgement = judge_trace(trace, _table(trace, options), users=users)
+    print(text_of(judgement, path.name))
+    if options.out is not None:
+        from rss_shield.eval.suite.judge.pictures import draw
+
+        options.out.mkdir(parents=True, exist_ok=True)
+        write_json(options.out / f"{path.stem}.json", json_of(judgement, path.name))
+        with atomic(options.out / f"{path.stem}.csv") as temporary:
+            pair_frames(judgement, not options.all_frames).to_csv(temporary, index=False)
+        draw(judgement, options.out / f"{path.stem}.png")
+        print(f"written to {options.out}: {path.stem}.json, {path.stem}.csv, {path.stem}.png")
+
+
+def _table(trace: Trace, options: argparse.Namespace) -> str | Preset | None:
+    rho = options.response_time
+    if rho is None:
+        return options.params
+    if options.params is None and "judge_params" in trace.meta:
+        raise ValueError("--response-time: expected --params beside it where the trace has a table of its own")
+    preset = PRESETS.get(options.params or "slides")
+    if preset is None or not rho > 0.0:
+        raise ValueError(f"--params {options.params} --response-time {rho}: expected a preset and a time > 0 [s]")
+    ego, other = (params._replace(response_time=rho) for params in (preset.ego, preset.other))
+    return preset._replace(ego=ego, other=other)
+
+
+def read(path: Path, options: argparse.Namespace) -> Trace:
+    """The trace that a file is, or amounts to."""
+    if path.suffix == ".csv":
+        return read_csv(path, _format(options), _lanes(path, options), options.dt)
+    if path.suffix == ".xml":
+        from rss_shield.eval.suite.judge.commonroad import read_commonroad
+
+        return read_commonroad(path)
+    return load(path)
+
+
+def _format(options: argparse.Namespace) -> Format:
+    if options.format not in FORMATS:
+        raise ValueError(f"--format {options.format}: expected one of {', '.join(FORMATS)}")
+    known = FORMATS[options.format]
+    names: dict[str, Any] = _pairs("--columns", options.columns)
+    units = _pairs("--units", options.units)
+    for option, pairs in (("--columns", names), ("--units", units)):
+        for name in pairs:
+            if name not in Format._fields[:10]:
+                raise ValueError(f"{option} {name}=...: expected one of {', '.join(Format._fields[:10])}")
+    known = known._replace(**names, units={**known.units, **units})
+    if options.y:
+        known = known._replace(y_up=options.y == "up")
+    return known._replace(point=options.point) if options.point else known
+
+
+def _pairs(option: str, text: str) -> dict[str, str]:
+    pairs = [pair.split("=", 1) for pair in text.split(",") if pair]
+    if any(len(pair) != 2 for pair in pairs):
+        raise ValueError(f"{option} {text}: expected FIELD=VALUE, separated by commas")
+    return {name.strip(): value.strip() for name, value in pairs}
+
+
+def _lanes(path: Path, options: argparse.Namespace) -> tuple[Lane, ...]:
+    if options.lanes is not None:
+        return read_lanes(options.lanes)
+    if not options.lanes_at:
+        return ()
+    try:
+        offsets = [float(y) for y in options.lanes_at.split(",")]
+    except ValueError:
+        raise ValueError(f"--lanes-at {options.lanes_at}: expected numbers, separated by commas [m]") from None
+    reach = read_csv(path, _format(options), (), options.dt).users.x
+    return straight_lanes(offsets, options.lane_width, float(np.nanmin(reach)) - 500.0, float(np.nanmax(reach)) + 500.0)

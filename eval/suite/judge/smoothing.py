@@ -1,0 +1,102 @@
+"""Accelerations of a log that has none, and how far to trust them.
+
+Positions are smoothed by a Savitzky-Golay filter (Savitzky, Golay, Analytical Chemistry 1964): in a window around every
+sample a polynomial is fitted by least squares, and its derivatives there are speed and acceleration. The filter is
+linear, so noise of standard deviation sigma in positions becomes sigma times the norm of the filter's coefficients in
+whatever it estimates. Sigma is what is left of the positions after the fit.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from rss_shield.shield.trace import Trace
+from rss_shield.shield.verdicts import DUTIES
+
+WINDOW = 1.1  # length of the fit: long enough for NGSIM's noise, short enough to see a braking begin [s]
+ORDER = 3
+SURE = 2.0  # standard deviations beyond which a broken duty is no noise
+
+
+class Noise(NamedTuple):
+    """Standard deviations of what a log says, or what was estimated from it; 0 = exact."""
+
+    position: float = 0.0  # [m]
+    speed: float = 0.0  # [m/s]
+    acceleration: float = 0.0  # [m/s^2]
+
+
+EXACT = Noise()
+
+
+def sigma_of(duty: int, noise: Noise) -> float:
+    """Standard deviation of what a duty is measured in."""
+    text = DUTIES[duty]
+    if text.endswith("[m/s^2]"):
+        return noise.acceleration
+    return noise.speed if text.endswith("[m/s]") else noise.position if text.endswith("[m]") else 0.0
+
+
+def window_of(dt: float, samples: int) -> int:
+    """Samples of a fit: odd, more than the order, and no more than there are."""
+    wanted = max(round(WINDOW / dt) | 1, ORDER + 2 | 1)
+    return min(wanted, samples if samples % 2 else samples - 1)
+
+
+def derivative(values: np.ndarray, dt: float, order: int) -> np.ndarray:
+    """Derivative of a series `[T]` without gaps by a fit around every sample; order 0 = the smoothed series."""
+    window = window_of(dt, len(values))
+    if window <= ORDER:  # too short for a fit
+        for _ in range(order):
+            values = np.gradient(values, dt) if len(values) > 1 else np.zeros_like(values)
+        return values
+    return savgol_filter(values, window, ORDER, deriv=order, delta=dt)
+
+
+def filled_in(trace: Trace) -> tuple[Trace, Noise]:
+    """The trace with accelerations where it has none, and how exact they are."""
+    u = trace.users
+    unknown = np.isnan(u.acceleration) & u.present
+    unknown[-1] = False  # nobody knows what follows
+    if not unknown.any():
+        return trace, EXACT
+    acceleration = u.acceleration.copy()
+    along: list[np.ndarray] = []
+    across: list[np.ndarray] = []
+    for i in np.flatnonzero(unknown.any(axis=0)):
+        for start, end in stretches(u.present[:, i]):
+            x, y = u.x[start:end, i], u.y[start:end, i]
+            cos, sin = np.cos(u.heading[start:end, i]), np.sin(u.heading[start:end, i])
+            forward = derivative(x, trace.dt, 2) * cos + derivative(y, trace.dt, 2) * sin
+            v = u.speed[start:end, i]  # the fit goes on braking a little after a car has come to rest
+            forward[:-1] = np.maximum(forward[:-1], (np.minimum(v[1:], 0.0) - v[:-1]) / trace.dt)
+            mine = unknown[start:end, i]
+            acceleration[start:end, i][mine] = forward[mine]
+            if end - start > window_of(trace.dt, end - start) > ORDER:
+                dx, dy = x - derivative(x, trace.dt, 0), y - derivative(y, trace.dt, 0)
+                along.append(dx * cos + dy * sin)
+                across.append(dy * cos - dx * sin)
+    return trace.replaced(users=replace(u, acceleration=acceleration)), max(
+        noise_of(along, trace.dt), noise_of(across, trace.dt)
+    )
+
+
+def noise_of(left: list[np.ndarray], dt: float) -> Noise:
+    """Standard deviations by what a fit has left over of positions."""
+    if not left:
+        return EXACT
+    window = window_of(dt, 10**6)
+    share = 1.0 - savgol_coeffs(window, ORDER)[window // 2]  # of the noise's variance that a fit leaves
+    sigma = float(np.sqrt(np.mean(np.concatenate(left) ** 2) / share))
+    speed, acceleration = (
+        float(np.linalg.norm(savgol_coeffs(window, ORDER, deriv=order, delta=dt))) * sigma for order in (1, 2)
+    )
+    return Noise(sigma, speed, acceleration)
+
+
+def stretches(present: np.ndarray) -> list[tuple[int, int]]:
+    """[start, end) of each stretch of a series `[T]` of bool that is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,0 +1,263 @@
+"""Trajectories in a CSV file, one row per road user and time, as a trace."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from rss_shield.eval.suite.judge.smoothing import derivative
+from rss_shield.shield.trace import Lane, Trace, straight_lane, users_of
+
+LENGTH, WIDTH = 4.5, 1.8  # of a user whose size the log does not say [m]
+_SLOW = 0.5  # whoever is slower keeps the heading that it had [m/s]
+_OFF_GRID = 0.2  # of a time step: samples may be this far from where they should be
+_FOOT = 0.3048  # [m]
+UNITS = {
+    **{"m": 1.0, "ft": _FOOT, "km": 1000.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "frame": 1.0},
+    **{"rad": 1.0, "deg": np.pi / 180.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 1609.344 / 3600.0, "ft/s": _FOOT},
+}
+
+
+class Format(NamedTuple):
+    """Which columns say what; "" = the log does not say it."""
+
+    id: str = "id"
+    t: str = "t"
+    x: str = "x"
+    y: str = "y"
+    heading: str = "heading"  # derived from where a user goes if the column is not there, and so on
+    speed: str = "speed"
+    length: str = "length"
+    width: str = "width"
+    kind: str = "kind"
+    lane: str = "lane"
+    units: Mapping[str, str] = {}  # by field: see UNITS; SI where nothing is said
+    y_up: bool = True  # y grows to the left of x, as in mathematics
+    point: str = "centre"  # what x and y are of: "centre", "front" (its middle) or "corner" (the least x and y)
+    frame_rate: float = 0.0  # of times that are counted in frames [Hz]
+    kinds: Mapping[Any, str] = {}  # names of kinds
+
+
+FORMATS = {
+    "plain": Format(),
+    # Krajewski et al., The highD Dataset, ITSC 2018: a box in the image, whose y grows downwards
+    "highd": Format(
+        *("id", "frame", "x", "y", "", "", "width", "height", "", "laneId"),
+        {"t": "frame"},
+        y_up=False,
+        point="corner",
+        frame_rate=25.0,
+    ),
+    # Next Generation Simulation, US DOT: middle of the front bumper, along and across the road, in feet
+    "ngsim": Format(
+        *("Vehicle_ID", "Frame_ID", "Local_Y", "Local_X", "", "v_Vel", "v_Length", "v_Width", "v_Class", "Lane_ID"),
+        {"t": "frame", **dict.fromkeys(("x", "y", "length", "width"), "ft"), "speed": "ft/s"},
+        y_up=False,
+        point="front",
+        frame_rate=10.0,
+        kinds={1: "motorcycle", 2: "car", 3: "truck"},
+    ),
+}
+
+
+def read_csv(
+    path: str | Path,
+    columns: Format | str = "plain",
+    lanes: tuple[Lane, ...] = (),
+    dt: float | None = None,
+) -> Trace:
+    """Read trajectories.
+
+    Args:
+      path: of the file, with a header.
+      columns: `Format`, or the name of one of FORMATS.
+      lanes: of the road; none = one straight road, see `World`.
+      dt: time between two samples: positions are interpolated to it [s]; None = as in the file.
+
+    Raises:
+      ValueError: a column that is needed is not there, a unit that is none, a value that is no number, a row that is
+        there twice, or times that are not evenly spaced.
+    """
+    known = FORMATS.get(columns) if isinstance(columns, str) else columns
+    if known is None:
+        raise ValueError(f"format = {columns!r}: expected one of {', '.join(FORMATS)}")
+    rows = pd.read_csv(path)
+    for name in ("id", "t", "x", "y"):
+        if getattr(known, name) not in rows.columns:
+            raise ValueError(
+                f"{path}: no column {getattr(known, name)!r} for {name}: expected one of {', '.join(rows.columns)}"
+            )
+    table = pd.DataFrame({name: _column(path, rows, known, name) for name in ("t", "x", "y")})
+    table["id"] = rows[known.id]
+    optional = ("heading", "speed", "length", "width")
+    for name in optional:
+        if getattr(known, name) in rows.columns:
+            table[name] = _column(path, rows, known, name)
+    if known.frame_rate:
+        table["t"] /= known.frame_rate
+    if known.y_up:
+        table["y"] *= -1.0
+        if "heading" in table:
+            table["heading"] *= -1.0
+    twice = table.duplicated(["id", "t"])
+    if twice.any():
+        row = table[twice].iloc[0]
+        raise ValueError(f"{path}: {known.id} = {row['id']} is there twice at {known.t} = {row['t']:g}: expected once")
+    step = dt or _step(path, table["t"].to_numpy())
+    start, end = float(table["t"].min()), float(table["t"].max())
+    time = start + np.arange(round((end - start) / step) + 1) * step
+    ids = list(dict.fromkeys(table["id"]))
+    state = {name: np.full((len(time), len(ids)), np.nan) for name in ("x", "y", "heading", "speed")}
+    length, width = np.full(len(ids), LENGTH), np.full(len(ids), WIDTH)
+    for i, (_, own) in enumerate(table.groupby("id", sort=False)):
+        own = own.sort_values("t")
+        for name, sizes in (("length", length), ("width", width)):
+            if name in own:
+                sizes[i] = float(own[name].median())
+        _put(own, time, step, length[i], width[i], known.point, {name: array[:, i] for name, array in state.items()})
+    kinds = ["unknown"] * len(ids)
+    if known.kind in rows.columns:
+        first = rows.drop_duplicates(known.id).set_index(known.id)[known.kind]
+        kinds = [known.kinds.get(first[i], str(first[i]) if not known.kinds else "unknown") for i in ids]
+    users = users_of(
+        [str(i) for i in ids], kinds, length, width, state["x"], state["y"], state["heading"], state["speed"]
+    )
+    return Trace(step, time, users, lanes, meta={"source": Path(path).name})
+
+
+def _column(path: str | Path, rows: pd.DataFrame, known: Format, name: str) -> pd.Series:
+    """A column in SI units."""
+    column, unit = getattr(known, name), known.units.get(name)
+    if unit is not None and unit not in UNITS:
+        raise ValueError(f"unit of {name} = {unit!r}: expected one of {', '.join(UNITS)}")
+    values = pd.to_numeric(rows[column], errors="coerce")
+    if not np.isfinite(values).all():
+        row = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise ValueError(f"{path}: {column} = {rows[column].iloc[row]!r} in row {row + 2}: expected a finite number")
+    return values * (UNITS[unit] if unit else 1.0)
+
+
+def _step(path: str | Path, times: np.ndarray) -> float:
+    times = np.unique(times)
+    if len(times) < 2:
+        raise ValueError(f"{path}: all rows have one time: expected two at least")
+    step = float(np.median(np.diff(times)))
+    off = np.abs((times - times[0]) / step - np.round((times - times[0]) / step))
+    if off.max() > _OFF_GRID:
+        at = times[int(off.argmax())]
+        raise ValueError(f"{path}: t = {at:g} s is no multiple of {step:g} s after the first: give dt to interpolate")
+    return step
+
+
+def _put(own: pd.DataFrame, time: np.ndarray, step: float, length: float, width: float, point: str, into: dict) -> None:
+    """One user's rows onto the common times; between rows that are farther apart than two steps it is not there."""
+    t, x, y = (own[name].to_numpy() for name in ("t", "x", "y"))
+    apart = max(step, float(np.median(np.diff(t)))) if len(t) > 1 else step
+    for a, b in zip(*_runs(t, 2.0 * apart), strict=True):
+        here = np.flatnonzero((time >= t[a] - 0.5 * step) & (time <= t[b - 1] + 0.5 * step))
+        if not len(here):
+            continue
+        run = slice(a, b)
+        px, py = np.interp(time[here], t[run], x[run]), np.interp(time[here], t[run], y[run])
+        if point == "corner":
+            px, py = px + 0.5 * length, py + 0.5 * width
+        vx, vy = derivative(px, step, 1), derivative(py, step, 1)
+        if "heading" in own:
+            heading = np.interp(time[here], t[run], np.unwrap(own["heading"].to_numpy()[run]))
+        else:
+            heading = _headings(vx, vy)
+        if "speed" in own:
+            speed = np.interp(time[here], t[run], own["speed"].to_numpy()[run])
+        else:
+            speed = vx * np.cos(heading) + vy * np.sin(heading)
+        if point == "front":
+            px, py = px - 0.5 * length * np.cos(heading), py - 0.5 * length * np.sin(heading)
+        for name, values in (("x", px), ("y", py), ("heading", heading), ("speed", speed)):
+            into[name][here] = values
+
+
+def _runs(t: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
+    cuts = np.flatnonzero(np.diff(t) > longest) + 1
+    return np.concatenate([[0], cuts]), np.concatenate([cuts, [len(t)]])
+
+
+def _headings(vx: np.ndarray, vy: np.ndarray) -> np.ndarray:
+    """Directions of motion; who hardly moves keeps the last one, or has the next one already [rad]."""
+    moving = np.flatnonzero(np.hypot(vx, vy) > _SLOW)
+    if not len(moving):
+        return np.full(len(vx), float(np.arctan2(vy.sum(), vx.sum())) if len(vx) else 0.0)
+    last = np.clip(np.searchsorted(moving, np.arange(len(vx)), side="right") - 1, 0, None)
+    return np.arctan2(vy, vx)[moving[last]]
+
+
+# ---------------------------------------------------------------- lanes
+
+
+def read_lanes(path: str | Path) -> tuple[Lane, ...]:
+    """Lanes from a JSON file: {"lanes": [{"id", "centre": [[x, y], ...], "width", "successors", "left", ...}, ...]}.
+
+    Fields are those of `shield.trace.Lane`; `centre` may leave headings out, `width` may be one number.
+
+    Raises:
+      ValueError: the file is no JSON, or a lane has no centre line, or a field that is none.
+    """
+    try:
+        given = json.loads(Path(path).read_text(encoding="utf-8"))["lanes"]
+    except (json.JSONDecodeError, KeyError, TypeError) as error:
+        raise ValueError(f"{path}: expected JSON with a list 'lanes' ({type(error).__name__}: {error})") from None
+    lanes = []
+    for one in given:
+        if not {"id", "centre"} <= set(one):
+            raise ValueError(f"{path}: lane {one!r}: expected the fields id and centre")
+        unknown = set(one) - set(Lane.__dataclass_fields__)
+        if unknown:
+            raise ValueError(
+                f"{path}: lane {one['id']!r} has an unknown field {min(unknown)!r}: expected "
+                f"{', '.join(Lane.__dataclass_fields__)}"
+            )
+        centre = with_headings(np.array(one["centre"], float))
+        width = np.broadcast_to(np.asarray(one.get("width", 3.5), float), len(centre)).copy()
+        rest = {k: v for k, v in one.items() if k not in ("id", "centre", "width", "successors")}
+        lanes.append(Lane(str(one["id"]), centre, width, tuple(map(str, one.get("successors", ()))), **rest))
+    return tuple(lanes)
+
+
+def with_headings(centre: np.ndarray) -> np.ndarray:
+    """A centre line `[P, 2]` with headings: at inner points halfway between those of the pieces on either side."""
+    if centre.shape[1] == 3:
+        return centre
+    steps = np.diff(centre, axis=0)
+    courses = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    heading = np.concatenate([courses[:1], 0.5 * (courses[:-1] + courses[1:]), courses[-1:]])
+    return np.column_stack([centre, heading])
+
+
+def straight_lanes(offsets: list[float], width: float, start: float, end: float, direction: float = 0.0) -> tuple:
+    """Straight lanes side by side, from left to right.
+
+    Args:
+      offsets: of their middles across the road, positive to the right of its direction [m].
+      width: of each [m].
+      start, end: along the road [m].
+      direction: of the road [rad].
+    """
+    cos, sin = np.cos(direction), np.sin(direction)
+
+    def point(s: float, y: float) -> tuple[float, float]:
+        return s * cos - y * sin, s * sin + y * cos
+
+    names, ordered = [f"lane {k}" for k in range(len(offsets))], sorted(offsets)
+    return tuple(
+        straight_lane(
+            names[k],
+            point(start, y),
+            point(end, y),
+            width,
+            left=names[k - 1] if k else "",
+            right=names[k + 1] if k + 1 < len(ordered) else "",
+        )
+        for k, y in enumerate(ordered)
+    )

@@ -1,0 +1,145 @@
+"""`rss-shield test`: models of ours and of others, functions, and what goes wrong."""
+
+import json
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+import pytest
+from stable_baselines3 import A2C, PPO, SAC
+
+import rss_shield.test
+from rss_shield.agents.load import algorithm_in, load_policy
+from rss_shield.agents.vec_env import VectorEnvAdapter
+
+ENV = "highway-fast-v0"
+SMALL = ["--episodes", "3", "--config.duration", "6"]
+DRIVERS = """
+import numpy as np
+
+number = 3
+
+def faster(observations):
+    return np.full(len(observations), 3)
+
+def faster_one(observation):
+    assert observation.shape == (5, 5)
+    return 3
+
+def one_for_all(observations):
+    return 3
+"""
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_driver.py").write_text(DRIVERS)
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    path = tmp_path_factory.mktemp("models") / "ppo.zip"
+    PPO("MlpPolicy", VectorEnvAdapter(rss_shield.make_vec(ENV, 2)), n_steps=8, batch_size=16, seed=0).save(path)
+    return path
+
+
+def played(*arguments):
+    rss_shield.test.main([*map(str, arguments), *SMALL, "--out", "out"])
+    return pd.read_csv("out/episodes.csv")
+
+
+def test_a_function_is_tested_with_the_shield_and_without(capsys):
+    episodes = played("my_driver:faster")
+    assert episodes.groupby("test", sort=False).size().to_dict() == {"off": 3, "on": 3}
+    assert set(episodes["seed"]) == {10**9, 10**9 + 1, 10**9 + 2}
+    assert episodes["length"].max() <= 6
+    assert (episodes.loc[episodes["test"] == "on", "blame"] == "no contact").all()
+    assert set(episodes.loc[episodes["test"] == "off", "blame"]) <= {"ego", "no contact"}
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"my_driver:faster on {ENV}, 3 episodes" in out
+    assert "Every episode, with its verdict: out/episodes.csv" in out
+    assert json.loads(Path("out/config.json").read_text())["config"]["config"] == {"duration": 6}
+
+
+def test_one_by_one_gives_the_same(capsys):
+    together = played("my_driver:faster", "--tests", "on")
+    alone = played("my_driver:faster_one", "--one-by-one", "--tests", "on")
+    columns = ["seed", "return", "length", "actions"]
+    pd.testing.assert_frame_equal(alone[columns], together[columns])
+
+
+def test_a_model_of_anybody_drives_as_it_predicts(model, capsys):
+    episodes = played(model, "--tests", "on")
+    env = rss_shield.make(ENV, config={"duration": 6})
+    predict = PPO.load(model, device="cpu").predict
+    for seed, ret in zip(episodes["seed"], episodes["return"], strict=True):
+        observation, _ = env.reset(seed=int(seed))
+        total, done = 0.0, False
+        while not done:
+            observation, reward, terminated, truncated, _ = env.step(int(predict(observation, deterministic=True)[0]))
+            total, done = total + float(reward), terminated or truncated
+        assert ret == pytest.approx(total)
+    assert algorithm_in(model) is PPO
+
+
+def test_a_card_says_on_which_road(model, tmp_path, capsys):
+    (tmp_path / "of-a-run").mkdir()
+    copy = tmp_path / "of-a-run" / "model.zip"
+    copy.write_bytes(model.read_bytes())
+    card = {"env_id": "merge-v0", "config": {}, "arm": "shielded", "train_seed": 4, "preset": "slides"}
+    sides = {side: rss_shield.PRESETS["slides"]._asdict()[side]._asdict() for side in ("ego", "other")}
+    card["parameters"] = {**sides, "source": "a test", "per_frame": False}
+    (tmp_path / "of-a-run" / "card.json").write_text(json.dumps(card))
+    rss_shield.test.main([str(copy), "--episodes", "2", "--tests", "off"])
+    folder = tmp_path / "runs" / "tested" / "of-a-run-model-merge-v0"
+    told = json.loads((folder / "config.json").read_text())["config"]
+    assert told["env_id"] == "merge-v0"
+    assert told["parameters"][0][:4] == list(rss_shield.PRESETS["slides"].ego)[:4]
+    assert set(pd.read_csv(folder / "episodes.csv")["train"]) == {"shielded"}
+
+
+def test_continuous_actions_are_found_out(tmp_path, capsys):
+    config = {"action": {"type": "ContinuousAction"}}
+    env = VectorEnvAdapter(rss_shield.make_vec(ENV, 2, config=config))
+    SAC("MlpPolicy", env, seed=0, policy_kwargs={"net_arch": [8]}).save("sac.zip")
+    episodes = played("sac.zip", "--tests", "on")
+    assert (episodes["blame"] == "no contact").all()
+    assert load_policy(tmp_path / "sac.zip")(np.zeros((4, 5, 5), np.float32)).shape == (4, 2)
+
+
+def test_algorithms_that_share_a_policy_are_told_apart(tmp_path):
+    A2C("MlpPolicy", gym.make("CartPole-v1")).save("a2c.zip")
+    assert algorithm_in(tmp_path / "a2c.zip") is A2C
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("nothing.zip", "nothing.zip: no such file; expected a model's .zip file or module:function"),
+        ("my_driver.py", "my_driver.py: not a model of stable-baselines3"),
+        ("no_module:drive", "no_module:drive: no module 'no_module'"),
+        ("my_driver:drive", "my_driver:drive: module 'my_driver' has no 'drive'"),
+        ("my_driver:number", "my_driver:number: int cannot be called; expected a function of observations"),
+        ("my_driver:one_for_all", "returned an array of shape () for 3 observations; expected one action for each"),
+        ("my_driver:faster --tests of", "--tests of is out of range: expected some of off, on"),
+        ("my_driver:faster --episodes 0", "--episodes 0 is out of range: expected at least 1"),
+        ("my_driver:faster --backend slow", "--backend slow is out of range: expected one of fast, highway-env"),
+        ("my_driver:faster --entry bold", "--entry bold is out of range: expected one of cautious, priority"),
+        ("my_driver:faster --preset best", "--preset best is out of range: expected one of auto, simulator"),
+        ("my_driver:faster --env-id no-road", "no-road"),
+        ("my_driver:faster --config.lane-count 3", "the nearest is config.lanes_count"),
+        ("MODEL --env-id intersection-v0", "made for observations (5, 5), but intersection-v0 has (15, 7)"),
+        ("MODEL --env-id merge-v0 --config.observation.vehicles-count 7", "but merge-v0 has (7, 5)"),
+    ],
+)
+def test_what_goes_wrong_ends_in_one_line_and_exit_code_2(arguments, message, model, capsys):
+    with pytest.raises(SystemExit) as stop:
+        rss_shield.test.main(
+            [*arguments.replace("MODEL", str(model)).split(), *SMALL[:2] * ("--episodes" not in arguments)]
+        )
+    assert stop.value.code == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("rss-shield test: error: ")]
+    assert len(lines) == 1
+    assert message in lines[0]
