@@ -159,7 +159,7 @@ class Config:
     replace: str = "frame"
     """When it replaces the agent's action: see `ShieldWrapper`."""
     risk: bool = False
-    """Measure the driving safety field, too (on highway-env only)."""
+    """Measure the driving safety field, too."""
     intervention_penalty: float = 0.0
     """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward. Arms with a
     penalty of their own, as penalty-0.5, keep theirs."""

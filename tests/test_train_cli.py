@@ -69,7 +69,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--rules.memory maybe", "--rules.memory"),
         ("--examine some", "examine = 'some': expected one of"),
         ("--filter abs", "filter = 'abs': expected one of rss"),
-        ("--risk", "the fast engine does not support risk = True"),
+        ("--traffic compliant", "the fast engine does not support traffic = 'compliant'"),
         ("--tracker paper", "--tracker paper is out of range: expected one of tensorboard, wandb, mlflow"),
         ("--entry bold", "--entry bold is out of range: expected one of cautious, priority, assertive"),
         ("--intent left", "--intent left is out of range: expected one of known, straight, any"),

@@ -62,9 +62,9 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         time_unknown, time_known_unsafe [s], band_risk (integral of RDSI over the stays in the unknown [s]), min_thw
         (at most 100), max_drac. See `shield.risk`.
       measures: only with the option `measures`, since reset: `min_thw_ahead`, `min_ttc_ahead`, `max_drac_ahead`,
-        `min_pet`, `near_misses`, `standing_free`, `impact_speed`, `delta_v` (`shield.risk.meter.Measures`); `violation_ego`,
-        `violation_other`, `violation_nobody`: time with a dangerous pair of which the ego, the other or nobody has
-        broken a duty by then [s]; `shield_time`: of the shield per frame, mean [s].
+        `min_pet`, `near_misses`, `standing_free`, `impact_speed`, `delta_v` (`shield.risk.meter.Measures`);
+        `violation_ego`, `violation_other`, `violation_nobody`: time with a dangerous pair of which the ego, the other or
+        nobody has broken a duty by then [s]; `shield_time`: of the shield per frame, mean [s].
       traffic_blame: with compliant traffic, the verdicts of all other cars that have had a contact, each from its
         own view.
 
