@@ -63,8 +63,8 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         (at most 100), max_drac. See `shield.risk`.
       measures: only with the option `measures`, since reset: `min_thw_ahead`, `min_ttc_ahead`, `max_drac_ahead`,
         `min_pet`, `near_misses`, `standing_free`, `impact_speed`, `delta_v` (`shield.risk.meter.Measures`);
-        `violation_ego`, `violation_other`, `violation_nobody`: time with a dangerous pair of which the ego, the other or
-        nobody has broken a duty by then [s]; `shield_time`: of the shield per frame, mean [s].
+        `violation_ego`, `violation_other`, `violation_nobody`: time with a dangerous pair of which the ego, the other
+        or nobody has broken a duty by then [s]; `shield_time`: of the shield per frame, mean [s].
       traffic_blame: with compliant traffic, the verdicts of all other cars that have had a contact, each from its
         own view.
 
