@@ -43,7 +43,7 @@ evidence: $(VENV)/installed  ## play scripted policies under the shield and coun
 # one after the other; what has been run is not run again
 SWEEPS := ablation rules presets response-times
 paper: $(VENV)/installed-dev  ## run every experiment of the results pages and write them (hours)
-	@echo "An estimate for 2 cores: half an hour per training, half an hour per sweep on highway-env, 3 hours in all."; date
+	@echo "An estimate for 2 cores: ten minutes per training, a quarter of an hour per sweep, two hours in all."; date
 	$(foreach name,$(SWEEPS),$(BIN)/rss-shield sweep experiments/$(name).yaml --workers 2 &&) true
 	$(BIN)/python bench/ablation.py --write $(ARGS)
 	$(foreach env,$(ENVS),$(BIN)/python train.py --env-id $(env) $(BUDGET_$(env)) --name $(env) --resume &&) true

@@ -9,6 +9,7 @@ response-times first; what has not been run is left out of the page.
 """
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,8 @@ from rss_shield.eval.runs.tasks import tasks_of  # noqa: E402
 from rss_shield.eval.stats import bootstrap_mean, clopper_pearson  # noqa: E402
 from rss_shield.shield.verdicts import BOTH, EGO  # noqa: E402
 
+OUTCOMES = ("contacts [%]", "ego at fault [%]", "a duty broken [%]")
+FRAMES = 150  # of an episode, at most
 PAGE = ROOT / "docs" / "results" / "ablation.md"
 HEADER = """# What each rule buys, and what it costs
 
@@ -46,9 +49,7 @@ SWEEPS = {
 
 def adversaries(episodes: int) -> str:
     """The compiled adversaries against the shield without one condition."""
-    rows: list[list[Any]] = [
-        ["without", "frame [s]", "others", "episodes", "ego at fault [%]", "a duty broken [%]", "frames overridden [%]"]
-    ]
+    rows: list[list[Any]] = [["without", "frame [s]", "others", "episodes", "contacts [%]", "ego at fault [%]"]]
     wholes = {
         (dt, others): ("nothing: the whole shield", {}, dt, others)
         for _, dt, others, _ in MUTATIONS.values()
@@ -56,11 +57,13 @@ def adversaries(episodes: int) -> str:
     }
     broken = [(name, change, dt, others) for name, (change, dt, others, _) in MUTATIONS.items()]
     for name, change, dt, others in [*wholes.values(), *broken]:
-        w = world(dt=dt, frames=150, bare=dt == FAST, others=others, **change)  # type: ignore[arg-type]
+        w = world(dt=dt, frames=FRAMES, bare=dt == FAST, others=others, **change)  # type: ignore[arg-type]
         played = play(episodes, w, seed=1)
-        faults = np.isin(played["verdict"], (EGO, BOTH)) & (played["contact"] >= 0)
-        shares = [percent(*clopper_pearson(int(seen.sum()), episodes)[:3]) for seen in (faults, played["broken"] > 0)]
-        overridden = bootstrap_mean(played["overridden"] / 150, np.random.default_rng(0))
+        contact = played["contact"] >= 0
+        outcomes = contact, contact & np.isin(played["verdict"], (EGO, BOTH)), played["broken"] > 0
+        shares = [percent(*clopper_pearson(int(seen.sum()), episodes)[:3]) for seen in outcomes]
+        frames = np.where(contact, played["contact"] + 1, FRAMES)
+        overridden = bootstrap_mean(played["overridden"] / frames, np.random.default_rng(0))
         rows.append([name, f"{dt:.3g}", others, spaced(episodes), *shares, percent(*overridden[:3])])
         print(" | ".join(map(str, rows[-1])), flush=True)
     return markdown(rows)
@@ -112,7 +115,13 @@ def swept(folder: Path, safety: str, performance: str) -> str:
     table = with_front(wide(points, axes), safety, performance)
     count = int(points["n"].max())
     text = markdown_of(texts(table, axes, shown_metrics(table, safety, performance)))
-    return f"{count} episodes a row; ★: on the Pareto front of its environment and policy.\n\n{text}"
+    return f"{count} episodes a row; ★: on the Pareto front of its environment and policy. {code_of(folder)}\n\n{text}"
+
+
+def code_of(folder: Path) -> str:
+    """By which code a sweep was run."""
+    record = json.loads((folder / "experiment.json").read_text(encoding="utf-8"))["versions"]
+    return f"Code {str(record['git_commit'])[:12]}, numpy {record['packages']['numpy']}, {record['cpu']}."
 
 
 def main() -> None:
@@ -124,7 +133,7 @@ def main() -> None:
     parts = [HEADER, "## Against adversaries who use every right", ADVERSARIES, adversaries(arguments.episodes)]
     table = hostile(arguments.runs / "ablation")
     if table:
-        parts += ["## Among hostile drivers on highway-env", HOSTILE, table]
+        parts += ["## Among hostile drivers on highway-env", f"{HOSTILE} {code_of(arguments.runs / 'ablation')}", table]
     for name, text in SWEEPS.items():
         if (arguments.runs / name / "points.csv").exists():
             experiment = read_experiment(ROOT / "experiments" / f"{name}.yaml")
@@ -140,7 +149,8 @@ def main() -> None:
 ADVERSARIES = """One ego, one or two others on a straight road, who keep the law by the table and otherwise do their
 worst; frames of 0.2 s where every spare room is taken out (cars of 2 cm, no wobble, no standstill gap), else of
 1/15 s. A duty may be broken without a contact where another margin still covers it. What they say:
-[register](../holes.md)."""
+[register](../holes.md). Where the
+table itself lacks a margin (C5) or the ego starts in danger (C6), a contact is not held against the ego."""
 HOSTILE = """Random meta-actions on `highway-fast-v0`, among reckless drivers, brake checkers, squeezers, swervers and
 rammers (`envs/highway/hostile.py`), judged by the whole table whatever the shield goes by. Costs: in
 stock traffic."""
