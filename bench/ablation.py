@@ -151,8 +151,8 @@ def main() -> None:
 ADVERSARIES = """One ego, one or two others on a straight road, who keep the law by the table and otherwise do their
 worst; frames of 0.2 s where every spare room is taken out (cars of 2 cm, no wobble, no standstill gap), else of
 1/15 s. A duty may be broken without a contact where another margin still covers it. What they say:
-[register](../holes.md). Where the table itself lacks a margin (C5) or the ego starts in danger (C6), a contact is not held
-against the ego; without the bound of the heading it turns further than the table says, which is no duty."""
+[register](../holes.md). Where the table itself lacks a margin (C5) or the ego starts in danger (C6), a contact is not
+held against the ego; without the bound of the heading it turns further than the table says, which is no duty."""
 HOSTILE = """Random meta-actions on `highway-fast-v0`, among reckless drivers, brake checkers, squeezers, swervers and
 rammers (`envs/highway/hostile.py`), judged by the whole table whatever the shield goes by. Costs: in
 stock traffic."""
