@@ -14,7 +14,7 @@ PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help compare $(ENVS:%=compare-%) test test-fast bench evidence campaign docs check clean
+.PHONY: help compare $(ENVS:%=compare-%) test test-fast bench evidence campaign paper docs check clean
 
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -39,6 +39,17 @@ bench: $(VENV)/installed-dev  ## run the benchmarks
 
 evidence: $(VENV)/installed  ## play scripted policies under the shield and count who is to blame (hours)
 	$(BIN)/python bench/evidence.py $(ARGS)
+
+# one after the other; what has been run is not run again
+SWEEPS := ablation rules presets response-times
+paper: $(VENV)/installed-dev  ## run every experiment of the results pages and write them (hours)
+	@echo "An estimate for 2 cores: ten minutes per training, a quarter of an hour per sweep, two hours in all."; date
+	$(foreach name,$(SWEEPS),$(BIN)/rss-shield sweep experiments/$(name).yaml --workers 2 &&) true
+	$(BIN)/python bench/ablation.py --write $(ARGS)
+	$(foreach env,$(ENVS),$(BIN)/python train.py --env-id $(env) $(BUDGET_$(env)) --name $(env) --resume &&) true
+	$(BIN)/python -m rss_shield.eval.pages $(ENVS:%=runs/%)
+	$(BIN)/rss-shield report $(ENVS:%=runs/%) $(SWEEPS:%=runs/%) --out runs/report
+	@date
 
 campaign: $(VENV)/installed  ## train every arm on two roads with many seeds, or go on with it (hours)
 	$(BIN)/python bench/campaign.py $(ARGS)

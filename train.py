@@ -27,6 +27,7 @@ import rss_shield
 from rss_shield.agents.blocks import available_devices, train_in_blocks
 from rss_shield.agents.learner import Learner, learner_of
 from rss_shield.agents.load import load_policy, policy_of
+from rss_shield.agents.trackers import TRACKERS, check_tracker
 from rss_shield.command_line import ConfigFile, fail, parsed, shown
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.configuration import check_config, default_config
@@ -158,7 +159,7 @@ class Config:
     replace: str = "frame"
     """When it replaces the agent's action: see `ShieldWrapper`."""
     risk: bool = False
-    """Measure the driving safety field, too (on highway-env only)."""
+    """Measure the driving safety field, too."""
     intervention_penalty: float = 0.0
     """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward. Arms with a
     penalty of their own, as penalty-0.5, keep theirs."""
@@ -183,6 +184,8 @@ class Config:
     """Environments side by side in each training."""
     workers: int = os.cpu_count() or 1
     """Processes that share the trainings and tests. Results do not depend on it."""
+    tracker: str = "tensorboard"
+    """What the numbers of training are written for: tensorboard, or also wandb (offline) or mlflow."""
     device: str = "cpu"
     """Where agents learn: cpu, cuda or auto. For networks this small the CPU is faster."""
     name: str = ""
@@ -432,6 +435,7 @@ def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, pr
         n_envs=config.n_envs,
         device=config.device,
         progress=progress,
+        tracker=config.tracker,
         watch=functools.partial(_remove, config, preset, row, total, path),
     )
 
@@ -510,6 +514,8 @@ def check(config: Config) -> None:
     """Refuse what is out of range, naming option, value and range. RSS parameters: see `resolve`."""
     try:
         rules_of(config.rules, "--rules")
+        if config.tracker in TRACKERS:
+            check_tracker(config.tracker)
         Options(**wrapped(config))
     except ValueError as error:
         fail(PROGRAM, str(error))
@@ -539,6 +545,7 @@ def check(config: Config) -> None:
         ("replay_episodes", config.replay_episodes >= 0, "at least 0"),
         ("n_envs", 1 <= config.n_envs <= 4096, "1 to 4096"),
         ("workers", 1 <= config.workers <= 256, "1 to 256"),
+        ("tracker", config.tracker in TRACKERS, f"one of {', '.join(TRACKERS)}"),
         ("device", config.device in devices, f"one of {', '.join(devices)} on this machine"),
         ("name", config.name in ("", valid_name(config.name)), f"{NAMES}, such as {valid_name(config.name)}"),
         ("resume", not (config.resume and config.overwrite), "--resume or --overwrite, not both"),
@@ -625,7 +632,7 @@ def valid_name(text: str) -> str:
     return name
 
 
-_NOT_RECORDED = ("list_arms", "workers", "name", "runs_dir", "resume", "overwrite")
+_NOT_RECORDED = ("list_arms", "workers", "tracker", "name", "runs_dir", "resume", "overwrite")
 
 
 def _given(overrides: Overrides) -> dict[str, float]:

@@ -20,10 +20,10 @@ import numpy as np
 import torch
 from gymnasium.vector import VectorEnv
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.logger import configure
 
 from rss_shield.agents.curve import CurveRecorder, truncate_curve
 from rss_shield.agents.learner import Learner
+from rss_shield.agents.trackers import logger_of
 
 Watch = Callable[[BaseAlgorithm], None]
 
@@ -39,6 +39,7 @@ def train_in_blocks(
     device: str = "cpu",
     progress: Callable[[int], None] = lambda timesteps: None,
     watch: Watch = lambda model: None,
+    tracker: str = "tensorboard",
 ) -> Path:
     """Train, or go on where an earlier call in the same folder was stopped.
 
@@ -51,6 +52,7 @@ def train_in_blocks(
       total_timesteps: decisions to learn from, rounded up to whole rollouts.
       n_envs: environments stepped side by side.
       progress: called with the timesteps done so far.
+      tracker: what else gets the numbers that TensorBoard gets, see `agents.trackers`.
       watch: called with the model before it is saved after a block, for tests on the way. It may draw random
         numbers: the next block seeds every generator anew.
 
@@ -69,7 +71,7 @@ def train_in_blocks(
     try:
         model = _loaded(learner, checkpoint, env, device) or _new(learner, folder, env, seed, device, total_timesteps)
         truncate_curve(curve, model.num_timesteps)
-        model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
+        model.set_logger(logger_of(tracker, folder))
         callbacks = [CurveRecorder(curve, progress), *learner.callbacks()]
         progress(model.num_timesteps)
         while model.num_timesteps < total_timesteps:

@@ -117,7 +117,10 @@ def _risk_in(shield: str | None, options: Options) -> RiskSettings | None:
 
 
 # options that the engine has no answer to, and what says that nobody asks
-_OF_HIGHWAY_ENV = {"traffic": "stock", "record": False, "judge_params": None, "judge_rules": None}
+_OF_HIGHWAY_ENV = {
+    **{"traffic": "stock", "record": False, "measures": False},
+    **{"judge_params": None, "judge_rules": None},
+}
 _OF_GYMNASIUM = {  # arguments of its `make_vec` that mean something else here
     "vectorization_mode": "backend = 'fast' or 'highway-env'",
     "vector_kwargs": "autoreset_mode and threads",

@@ -72,6 +72,7 @@ class Given(TypedDict, total=False):
     traffic: str
     examine: str
     risk: bool | RiskSettings
+    measures: bool
     filter: str
     filter_at: float | None
     correction: str
@@ -99,6 +100,7 @@ class Options:
     traffic: str = "stock"
     examine: str = "table"
     risk: bool | RiskSettings = False
+    measures: bool = False
     filter: str = "rss"
     filter_at: float | None = None
     correction: str = "nearest"
@@ -122,6 +124,8 @@ class Options:
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {', '.join(known)}")
 
+        if not isinstance(self.measures, bool):
+            raise ValueError(f"measures = {self.measures!r}: expected True or False")
         if self.filter_at is not None:
             number("filter_at", self.filter_at, 0.01)
             if FILTERS.index(self.filter) not in THRESHOLDS:

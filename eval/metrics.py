@@ -45,6 +45,16 @@ METRICS = (
     Metric("hard_braking_share", "hard braking", "%", "mean", 100, 0, (0, 1)),
     Metric("comfortable_share", "comfortable", "%", "mean", 100, 0, (0, 1)),
     Metric("min_time_gap", "min time gap", "s", "median", 1, 1, (0, math.inf)),
+    Metric("frozen", "frozen", "%", "rate", 100, 0, (0, 1)),
+    Metric("near_misses", "near misses", "", "mean", 1, 2, (0, math.inf)),
+    Metric("impact", "impact speed", "m/s", "mean", 1, 1, (0, math.inf)),
+    Metric("impact_delta_v", "DeltaV", "m/s", "mean", 1, 1, (0, math.inf)),
+    Metric("min_thw_ahead", "min THW ahead", "s", "median", 1, 1, (0, math.inf)),
+    Metric("max_drac_ahead", "max DRAC ahead", "m/s²", "median", 1, 1, (0, math.inf)),
+    Metric("min_pet", "min PET", "s", "median", 1, 1, (0, math.inf)),
+    Metric("violation_ego", "RSS violated by ego", "s", "mean", 1, 2, (0, math.inf)),
+    Metric("violation_other", "RSS violated by other", "s", "mean", 1, 2, (0, math.inf)),
+    Metric("shield_time", "shield per frame", "µs", "median", 1e6, 0, (0, math.inf)),
     Metric("min_ttc", "min TTC", "s", "median", 1, 1, (0, math.inf)),
     # where risk is measured
     Metric("min_thw", "min THW", "s", "median", 1, 1, (0, math.inf)),
@@ -64,6 +74,10 @@ def with_outcomes(episodes: pd.DataFrame) -> pd.DataFrame:
     """
     if "success" in episodes:
         episodes = episodes.assign(time_to_goal=episodes["time"].where(episodes["success"].astype(bool)))
+    if "impact_speed" in episodes:  # of the episodes with a contact
+        touched = episodes["crashed"].astype(bool)
+        impacts = {"impact": "impact_speed", "impact_delta_v": "delta_v"}
+        episodes = episodes.assign(**{name: episodes[column].where(touched) for name, column in impacts.items()})
     blame, crash = episodes["blame"], episodes["crashed"].astype(bool)
     at_fault = blame.isin(AT_FAULT)
     return episodes.assign(

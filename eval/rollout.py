@@ -79,7 +79,8 @@ def evaluate(
             for e in np.flatnonzero(ended).tolist():
                 if playing[e] < len(seeds):
                     record = _record(seeds[playing[e]], returns[e], speeds[e], int(lengths[e]), _info(infos, e))
-                    records[playing[e]] = record | {"actions": " ".join(map(str, actions[e]))} | more(env, e)
+                    record |= {"actions": " ".join(map(str, actions[e]))} | more(env, e)
+                    records[playing[e]] = with_frozen(record, bool(truncated[e] and not terminated[e]))
                 playing[e] = next(upcoming)
                 returns[e], speeds[e], lengths[e], actions[e] = 0.0, 0.0, 0, []
             progress(len(records))
@@ -105,7 +106,8 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
     the simulation frames; dangerous_pairs, broken_duties: pair-frames in danger, and those on which the
     car broke its duty; min_ttc: smallest time to collision [s]; what was changed and how the ride felt: the keys
     `RIDE`, and with the option `risk` the keys `RISK`, as `envs.ShieldWrapper` documents them (max_drac at most
-    `MOST_DRAC`); evidence: the verdict's grounds as JSON, {} without contact.
+    `MOST_DRAC`); with the option `measures` what it adds, and frozen: the time was up and the ego had stood for 5 s or
+    more with nobody within 20 m; evidence: the verdict's grounds as JSON, {} without contact.
     """
     env = make_env()
     try:
@@ -120,7 +122,17 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
             done = terminated or truncated
     finally:
         env.close()
-    return _record(seed, total_reward, total_speed, length, info)
+    return with_frozen(_record(seed, total_reward, total_speed, length, info), bool(truncated and not terminated))
+
+
+FROZEN = 5.0  # [s]
+
+
+def with_frozen(record: dict[str, Any], time_up: bool) -> dict[str, Any]:
+    """Where it is known how long the ego has stood with nobody within 20 m: has it frozen until the time was up?"""
+    if "standing_free" not in record:
+        return record
+    return record | {"frozen": time_up and record["standing_free"] >= FROZEN}
 
 
 def _record(seed: int, total_reward: float, total_speed: float, length: int, info: dict[str, Any]) -> dict[str, Any]:
@@ -145,6 +157,7 @@ def _record(seed: int, total_reward: float, total_speed: float, length: int, inf
         "broken_duties": int(info["episode_broken_duties"]),
         "min_ttc": float(info["min_ttc"]),
         **{name: float(info[name]) for name in RIDE if name in info},
+        **{name: float(value) for name, value in info.get("measures", {}).items()},
         **{name: _risk(name, info[name]) for name in RISK if name in info},
         "evidence": json.dumps(info["blame_evidence"] if blame else {}, default=_plain),
     }

@@ -25,6 +25,7 @@ SLOW = frozenset(
         "envs/test_junction_roads",
         "envs/test_junction_sizes",
         "envs/test_lane_changes",
+        "envs/test_measured",
         "envs/test_multi_agent",
         "envs/test_parallel_env",
         "envs/test_random_roads",

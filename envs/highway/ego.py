@@ -1,5 +1,6 @@
 """highway-env objects to shield arrays and back: the only reader of highway-env's internals."""
 
+from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -137,6 +138,7 @@ class ShieldedEgo:
         self.record: list[Frame] | None = [] if record else None
         self.look: Look | None = None
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
+        self.measured: Any = None  # `EgoMeter` likewise
         self.judge = self  # or another, which watches by a table of its own
         self.answers = False  # does a filter that looks once per decision respond in this one?
         vehicle.act = self.act
@@ -158,9 +160,13 @@ class ShieldedEgo:
             self.nominal = dict(vehicle.action)
             self._refuse_lane_change(before)
         elif not self.check_contact():
+            began = perf_counter()
             self._frame()
+            spent = perf_counter() - began
             if self.judge is not self:
                 self.judge.watch()
+            if self.measured is not None:
+                self.measured.look(self, spent)
             if self.meter is not None:
                 self.meter.look(self)
 

@@ -8,6 +8,7 @@ import gymnasium as gym
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
 from rss_shield.envs.highway.ego import ShieldedEgo
+from rss_shield.envs.highway.measured import EgoMeter
 from rss_shield.envs.highway.risk import RiskMeter
 from rss_shield.envs.highway.step import attach, shield_on
 from rss_shield.envs.options import Options, Settings, check_mode, check_risk, settings_for
@@ -108,6 +109,7 @@ class EgoShields(gym.Wrapper):
             )
             shield.is_ego = True
             shield.meter = RiskMeter(self.risk) if self.risk is not None else None
+            shield.measured = EgoMeter(shield) if self.options.measures else None
             if vehicle.crashed:
                 shield.had_contact_before()
                 shield.judge.had_contact_before()

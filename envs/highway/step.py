@@ -100,6 +100,7 @@ def info_of(ego: ShieldedEgo, cost: float = 0.0) -> dict[str, Any]:
         for name in JUDGED:
             step[name] = judge.tally[name]
     info = info_at(shield_infos(step, ego.settings.table.dt), 0)
+    info |= {"measures": ego.measured.info(ego)} if ego.measured is not None else {}
     return info | (ego.meter.info() if ego.meter is not None else {})
 
 

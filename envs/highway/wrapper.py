@@ -61,6 +61,10 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         and the largest `drac` [m/s^2]. Since reset: max_rdsi (of one source), max_total_rdsi, time_known_safe,
         time_unknown, time_known_unsafe [s], band_risk (integral of RDSI over the stays in the unknown [s]), min_thw
         (at most 100), max_drac. See `shield.risk`.
+      measures: only with the option `measures`, since reset: `min_thw_ahead`, `min_ttc_ahead`, `max_drac_ahead`,
+        `min_pet`, `near_misses`, `standing_free`, `impact_speed`, `delta_v` (`shield.risk.meter.Measures`);
+        `violation_ego`, `violation_other`, `violation_nobody`: time with a dangerous pair of which the ego, the other
+        or nobody has broken a duty by then [s]; `shield_time`: of the shield per frame, mean [s].
       traffic_blame: with compliant traffic, the verdicts of all other cars that have had a contact, each from its
         own view.
 
@@ -85,6 +89,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         somebody (`shield.junctions.examined`).
       traffic: "stock", or "compliant": every other car has a shield of its own, in every mode.
       risk: measure the driving safety field around the ego, too: True, or `RiskSettings`.
+      measures: tell in infos how critical the episode was, and what the shield took in time.
       filter: what acts, for comparison: "rss", this shield, or one of the literature's, judged by RSS all the same:
         "ttc" brakes below a time to collision, "distance-45m" below 45 m, "cbf" is a control barrier function on the
         headway, "limits" are the always-on limits alone, "literal-def10" is Def. 10 as printed, looked at once per

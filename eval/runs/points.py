@@ -18,8 +18,16 @@ from rss_shield.eval.stats import (
 LESS_IS_BETTER = frozenset(
     [
         *("crash", "at_fault", "other", "inherited", "none", "time_to_goal", "override_share", "anticipation_share"),
-        *("mean_acceleration_change", "rms_jerk", "hard_braking_share", "frozen", "near_misses", "impact_speed"),
-        *("max_drac", "rss_violation_ego", "rss_violation_others"),
+        *(
+            "mean_acceleration_change",
+            "rms_jerk",
+            "hard_braking_share",
+            "frozen",
+            "near_misses",
+            "impact",
+            "max_drac_ahead",
+        ),
+        *("violation_ego", "violation_other", "shield_time"),
     ]
 )
 

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from gymnasium.vector import AutoresetMode
 
+from rss_shield.envs.fast.measured import columns
 from rss_shield.envs.make import make
 from rss_shield.envs.make_vec import make_vec
 from rss_shield.eval.rollout import evaluate, run_episode
@@ -42,8 +43,13 @@ def play(environment: str, policy: str, options: dict[str, Any], seeds: range) -
         ]
         return pd.DataFrame(episodes)
 
+    measured = arguments.pop("measures", False)
+
     def batch(n: int) -> Any:
-        return make_vec(environment, n, autoreset_mode=AutoresetMode.DISABLED, **arguments)
+        env: Any = make_vec(environment, n, autoreset_mode=AutoresetMode.DISABLED, **arguments)
+        if measured:
+            env.recording.choose(range(n))
+        return env
 
     env = batch(1)
     space = env.single_action_space
@@ -53,7 +59,16 @@ def play(environment: str, policy: str, options: dict[str, Any], seeds: range) -
     for chunk in chunks:
         # as many environments as episodes, so each plays the one of its own policy
         each = [Scripted(policy, space, seed) for seed in chunk]
-        frames.append(evaluate(batch, partial(_act, each), chunk, n_envs=len(chunk), keep_actions=False))
+        frames.append(
+            evaluate(
+                batch,
+                partial(_act, each),
+                chunk,
+                n_envs=len(chunk),
+                keep_actions=False,
+                more=columns if measured else lambda env, e: {},
+            )
+        )
     return pd.concat(frames, ignore_index=True).drop(columns="actions")
 
 

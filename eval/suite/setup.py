@@ -14,7 +14,7 @@ from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
 
 OTHERS = {"reckless": RECKLESS, **HOSTILE}  # who else is on the road, by name
 _SHIELD = (
-    *("entry", "intent", "waiting", "examine", "traffic", "risk"),
+    *("entry", "intent", "waiting", "examine", "traffic", "risk", "measures"),
     *("filter", "filter_at", "correction", "replace", "intervention_penalty", "penalty_on"),
 )
 _TABLE = ("preset", "ego", "other")
