@@ -61,17 +61,18 @@ def page_of(outcomes: list[Outcome]) -> str:
     lines = [
         "# Scenarios",
         "",
-        "Written by `rss-shield scenarios --write docs/results`. Scripted situations. What is expected of each is worked "
-        "out by hand in `eval/suite/scenarios/catalogue.py`, arithmetic included, and compared here with what comes out.",
+        "Written by `rss-shield scenarios --write docs/results`. Scripted situations. What is expected of each is "
+        "worked out by hand in `eval/suite/scenarios/catalogue.py`, arithmetic included, and compared here with "
+        "what comes out.",
         "",
-        f"{as_derived} of {len(outcomes)} come out as derived. Without the shield {len(contacts)} end in a contact, with "
-        f"it {len(left)}, of which {at_fault} are the ego's fault. Nothing is drawn at random, so there is no interval: "
-        "every scenario is played once and is the same each time.",
+        f"{as_derived} of {len(outcomes)} come out as derived. Without the shield {len(contacts)} end in a contact, "
+        f"with it {len(left)}, of which {at_fault} are the ego's fault. Nothing is drawn at random, so there is no "
+        "interval: every scenario is played once and is the same each time.",
         "",
-        "*Danger*: as derived, then as seen on frames of 0.1 s; up to 0.3 s earlier is as derived, for what sampling and "
-        "boxes that may turn cost. *Def. 10*: the verdict with the shield by the letter of Def. 10, without the duty to "
-        "brake for whoever has cut in (hole H6), where that is played. Verdicts are from the ego's view, by the full "
-        "table in every column.",
+        "*Danger*: as derived, then as seen on frames of 0.1 s; up to 0.3 s earlier is as derived, for what "
+        "sampling and boxes that may turn cost. *Def. 10*: the verdict with the shield by the letter of Def. 10, "
+        "without the duty to brake for whoever has cut in (hole H6), where that is played. Verdicts are from the "
+        "ego's view, by the full table in every column.",
         "",
         "| situation | kind | danger [s] | axis | response | off | on | Def. 10 | speed taken off [m/s] |",
         "|---|---|---|---|---|---|---|---|---|",
