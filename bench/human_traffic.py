@@ -147,7 +147,7 @@ def page_of(traces: dict, seed: int) -> str:
     lines += [f"| median time gap | | {' | '.join(cells)} |", "", "## Which response time fits", ""]
     together = followers_of(traces)
     lines += _fitting(together, rng)
-    lines += _duties(traces)
+    lines += _duties(traces, rng)
     return "\n".join(lines) + "\n"
 
 
@@ -170,7 +170,7 @@ def _fitting(followers: Followers, rng: np.random.Generator) -> list[str]:
     return lines
 
 
-def _duties(traces: dict) -> list[str]:
+def _duties(traces: dict, rng: np.random.Generator) -> list[str]:
     """Who breaks which duty, and how often the proper response is given."""
     lines = [
         "",
@@ -179,8 +179,8 @@ def _duties(traces: dict) -> list[str]:
         "Stretches of danger of one user with another, from the view of who owes, with the parameters of the preset "
         "for everybody. *Surely broken*: by more than two standard deviations of what positions and estimates are "
         "worth. *Response given*: of the samples on which braking is owed, after the response time, those on which "
-        "the command surely or maybe kept it. *First braking*: median time from the threshold until who owes brakes "
-        "with more than 0.5 m/s², of those that did.",
+        "the estimated command kept it, with an interval bootstrapped over stretches. *First braking*: median time "
+        "from the threshold until who owes brakes with more than 0.5 m/s², of those that did.",
         "",
         "| preset | log | role | stretches | surely broken | of these weak braking | sideways | response given | "
         "first braking [s] |",
@@ -190,7 +190,7 @@ def _duties(traces: dict) -> list[str]:
         for name, trace in traces.items():
             judgement = judge_trace(_unknown(trace), preset)
             for role in ("rear", "front"):
-                lines.append(_duty_row(preset, name, role, judgement))
+                lines.append(_duty_row(preset, name, role, judgement, rng))
     return lines
 
 
@@ -199,27 +199,37 @@ def _unknown(trace):
     return trace.replaced(users=replace(trace.users, acceleration=np.full_like(trace.users.x, np.nan)))
 
 
-def _duty_row(preset: str, name: str, role: str, judgement) -> str:
+def _duty_row(preset: str, name: str, role: str, judgement, rng: np.random.Generator) -> str:
     dangers = [one for one in judgement.dangers if one.role == role]
     broken = [one for one in dangers if one.duty and one.is_sure]
     weak = sum(one.duty.startswith("braked") for one in broken)
     aside = sum("across the lane" in one.duty for one in broken)
-    kept = owed = 0
-    delays = []
+    kept, owed, delays = [], [], []
     trace, rho, dt = judgement.trace, judgement.table.other.response_time, judgement.trace.dt
     for one in dangers:
         frames = judgement.seen[one.user].frames[:, one.partner]
         here = (trace.time >= one.start - 1e-9) & (trace.time < one.end - 1e-9) & frames["dangerous"]
         late = here & frames["owes_braking"] & (frames["since"] * dt >= rho - 1e-9)
-        owed, kept = owed + int(late.sum()), kept + int((late & (frames["duty"] == 0)).sum())
+        owed.append(int(late.sum()))
+        kept.append(int((late & (frames["duty"] == 0)).sum()))
         if frames["owes_braking"][here].any():
             a = trace.users.acceleration[here, one.user]
             first = np.flatnonzero(a < -BRAKES)
             delays += [float(frames["since"][here][first[0]] * dt)] if len(first) else []
-    share = f"{kept / owed:.0%} of {owed}" if owed else "none owed"
+    share = _share(np.array(kept), np.array(owed), rng)
     delay = f"{np.median(delays):.1f} (n = {len(delays)})" if delays else "none"
     cells = (preset, name, role, len(dangers), len(broken), weak, aside, share, delay)
     return "| " + " | ".join(map(str, cells)) + " |"
+
+
+def _share(kept: np.ndarray, owed: np.ndarray, rng: np.random.Generator) -> str:
+    """Share of the samples owed, with an interval over stretches of danger."""
+    if not owed.sum():
+        return "none owed"
+    drawn = rng.integers(len(owed), size=(DRAWS, len(owed)))
+    shares = kept[drawn].sum(axis=1) / np.maximum(owed[drawn].sum(axis=1), 1)
+    low, high = np.quantile(shares, [0.5 * (1 - LEVEL), 0.5 * (1 + LEVEL)])
+    return f"{kept.sum() / owed.sum():.0%} ({low:.0%} to {high:.0%}) of {owed.sum()}"
 
 
 if __name__ == "__main__":

@@ -48,6 +48,7 @@ SLOW = frozenset(
         "eval/test_stats_coverage",
         "eval/test_trace_risk",
         "fast/test_action_masks",
+        "eval/test_stress",
         "fast/test_adapter",
         "fast/test_floats",
         "fast/test_intersection",
