@@ -25,9 +25,9 @@ from rss_shield.envs.make_vec import make_vec
 from rss_shield.eval.files import write_json
 from rss_shield.eval.rollout import NO_CONTACT, evaluate
 from rss_shield.eval.stats import clopper_pearson
-from rss_shield.shield.lanes.judge import AT_FAULT, VERDICTS
 from rss_shield.shield.params import PRESETS
 from rss_shield.shield.trace import save
+from rss_shield.shield.verdicts import AT_FAULT, VERDICTS
 
 POLICIES = ("random", "faster", "slower", "switching")
 DEFAULT_ENVS = ("highway-fast-v0", "merge-v0", "exit-v0", "two-way-v0", "roundabout-v0", "intersection-v0")

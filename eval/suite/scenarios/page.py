@@ -10,8 +10,8 @@ from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.pictures import draw
 from rss_shield.eval.suite.scenarios.catalogue import SCENARIOS
 from rss_shield.eval.suite.scenarios.stage import LITERAL, Result, Scenario, play
-from rss_shield.shield.lanes.judge import AT_FAULT
 from rss_shield.shield.trace import save
+from rss_shield.shield.verdicts import AT_FAULT
 
 EARLIER, LATER = 0.3, 0.11  # danger may be seen so much before and after the time of the formulas [s]
 

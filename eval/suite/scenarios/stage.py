@@ -10,10 +10,11 @@ from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.recorder import Film
-from rss_shield.envs.highway.step import begin_step, end_step
+from rss_shield.envs.highway.step import begin_step
 from rss_shield.envs.options import LANES, Settings
+from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.lanes.controller import response_name
-from rss_shield.shield.params import RSSParams, Rules
+from rss_shield.shield.params import RSSParams, Rules, Table
 from rss_shield.shield.trace import Trace
 
 DT = 0.1  # length of a frame [s]
@@ -140,7 +141,7 @@ def play(scenario: Scenario, shield: bool, rules: Rules = RULES) -> Result:
     cars = [_car(road, car) for car in scenario.cars]
     road.vehicles = list(cars)
     ego = cars[0]
-    guard = ShieldedEgo(ego, Settings(EGO, OTHER, rules, shield, DT, LANES))
+    guard = ShieldedEgo(ego, Settings(Table(EGO, OTHER, rules, DT), shield, LANES))
     guard.is_ego = True
     stage: Any = Stage(road, [ego])
     film = Film(stage)
@@ -148,27 +149,27 @@ def play(scenario: Scenario, shield: bool, rules: Rules = RULES) -> Result:
     for frame in range(round(scenario.seconds / DT)):
         for car in cars:
             car.clock = frame * DT
-        had_contact = begin_step(guard)
+        begin_step(guard)
         ego.act(ego.commands())
         road.act()
         partner = next((k for k, other in enumerate(guard.others) if other.script.name == scenario.partner), None)
-        if danger is None and partner is not None and guard.contact is None and guard.memory["since"][partner] > 0:
-            danger, axis = frame * DT, guard._danger(partner, int(guard.memory["axes"][partner]))
+        if danger is None and partner is not None and not guard.has_contact and guard.memory["since"][partner] > 0:
+            danger, axis = frame * DT, AXES[int(guard.memory["axes"][partner])]
         look = guard.look
         if look is not None and danger == frame * DT:
             response = _response(look.response)
-        if look is not None and guard.contact is None:
+        if look is not None and not guard.has_contact:
             lost += (look.wish.acceleration - look.command.acceleration) * DT
         road.step(DT)
-        end_step(guard, had_contact, None)
+        guard.check_contact()
         film.look_for_contacts()
-        if guard.contact is not None and any(car.crashed for car in cars):
+        if guard.has_contact and any(car.crashed for car in cars):
             break
     trace = film.develop()
-    verdict = guard.contact["verdict"] if guard.contact else ""
     named = replace(trace.users, ids=tuple(car.name for car in scenario.cars))
     trace = trace.replaced(users=named, meta=trace.meta | _meta(scenario, rules, shield))
-    return Result(verdict, danger, axis, response, trace, guard.broken_duties, lost)
+    broken = int(guard.since["broken_duties"])
+    return Result(guard.blame, danger, axis, response, trace, broken, lost)
 
 
 def _response(bits: int) -> str:
