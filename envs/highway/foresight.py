@@ -10,13 +10,7 @@ from typing import Any
 import numpy as np
 from highway_env.envs.common.action import DiscreteMetaAction
 
-from rss_shield.envs.decisions.foresight import (
-    Aim,
-    Seen,
-    first_response,
-    make_stage,
-    without_anticipation,
-)
+from rss_shield.envs.decisions.foresight import Aim, Seen, first_response, make_stage, without_anticipation
 from rss_shield.envs.decisions.junctions import first_override
 from rss_shield.envs.decisions.masks import allow
 from rss_shield.envs.highway.ego import ShieldedEgo
