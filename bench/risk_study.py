@@ -208,8 +208,8 @@ def reaction_part(frame: pd.DataFrame, radial: pd.DataFrame) -> str:
             f"before it at which each measure begins to warn for good, the ego at {SHOWN} km/h, and in brackets from "
             f"the least to the most over {EGO_SPEEDS[0]} to {EGO_SPEEDS[-1]} km/h in steps of 10 (n = "
             f"{len(EGO_SPEEDS)}, no chance in it). Observed from {BEFORE:g} s before the contact on, so {BEFORE:.1f} "
-            f"means all along. Last moment: when braking at {HARD:g} m/s² still avoids it. TTC: toward whoever is in the "
-            f"ego's way. RSS: longitudinally and laterally too near, by the parameters of a preset.",
+            f"means all along. Last moment: when braking at {HARD:g} m/s² still avoids it. TTC: toward whoever is in "
+            f"the ego's way. RSS: longitudinally and laterally too near, by the parameters of a preset.",
             markdown(rows),
             "![Risk, TTC and RSS before a contact](../risk.png)",
             _first_words(frame, radial),
