@@ -46,6 +46,7 @@ SLOW = frozenset(
         "eval/test_replay_page",
         "eval/test_rollout",
         "eval/test_scenarios",
+        "eval/test_showcase",
         "eval/test_stats_coverage",
         "eval/test_trace_risk",
         "fast/test_action_masks",
