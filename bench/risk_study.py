@@ -335,6 +335,8 @@ def play(env_id: str, shield: str, episodes: int, driver: Callable[[int, int], C
 
 def _band(looks: list[Any]) -> float:
     """Risk of an episode [s]: RDSI over the time in the unknown band."""
+    if not looks:  # a contact at once
+        return 0.0
     times, rdsi, lower, upper = np.array([(look.time, look.rdsi, look.lower, look.upper) for look in looks]).T
     return band_risk(times, rdsi, lower, upper).total
 
