@@ -175,8 +175,7 @@ def reaction_time(rows: pd.DataFrame, holds: Any) -> float:
 
 
 def last_moment(situation: Situation, v: float) -> float:
-    """Time before the contact at which braking at `HARD` just avoids it [s]: to the speed of who is ahead, or to "
-    "rest."""
+    """Time before the contact at which braking at `HARD` just avoids it [s]: to the other's speed, or to rest."""
     closing = v - (0.0 if situation.crosses else situation.speed)
     return closing / (2 * HARD)
 
@@ -336,13 +335,15 @@ def play(env_id: str, shield: str, episodes: int, driver: Callable[[int, int], C
 
 def _band(looks: list[Any]) -> float:
     """Risk of an episode [s]: RDSI over the time in the unknown band."""
+    if not looks:  # a contact at once
+        return 0.0
     times, rdsi, lower, upper = np.array([(look.time, look.rdsi, look.lower, look.upper) for look in looks]).T
     return band_risk(times, rdsi, lower, upper).total
 
 
 def trained(path: Path) -> Callable[[int, int], Callable[[Any], int]]:
     """A model of train.py as a driver."""
-    from rss_shield.agents.ppo import load_policy  # takes seconds to import
+    from rss_shield.agents.load import load_policy  # takes seconds to import
 
     policy = load_policy(path)
     return lambda actions, seed: lambda observation: int(policy(observation[None])[0])
