@@ -49,7 +49,7 @@ SWEEPS = {
 
 def adversaries(episodes: int) -> str:
     """The compiled adversaries against the shield without one condition."""
-    rows: list[list[Any]] = [["without", "frame [s]", "others", "episodes", "contacts [%]", "ego at fault [%]"]]
+    rows: list[list[Any]] = [["without", "frame [s]", "others", "episodes", *OUTCOMES, "frames overridden [%]"]]
     wholes = {
         (dt, others): ("nothing: the whole shield", {}, dt, others)
         for _, dt, others, _ in MUTATIONS.values()
@@ -96,6 +96,8 @@ def hostile(folder: Path) -> str | None:
     ]
     for setting, frame in episodes.groupby("setting", sort=False):
         wild, stock, rng = frame[~frame["stock"]], frame[frame["stock"]], np.random.default_rng(0)
+        if not (len(wild) and len(stock)):  # the sweep is still under way
+            continue
         rates = [percent(*clopper_pearson(int(wild[name].sum()), len(wild))[:3]) for name in ("at_fault", "crash")]
         override = percent(*bootstrap_mean(wild["override_share"], rng)[:3])
         means = [bootstrap_mean(stock[name], rng) for name in ("return", "rms_jerk")]
@@ -149,8 +151,8 @@ def main() -> None:
 ADVERSARIES = """One ego, one or two others on a straight road, who keep the law by the table and otherwise do their
 worst; frames of 0.2 s where every spare room is taken out (cars of 2 cm, no wobble, no standstill gap), else of
 1/15 s. A duty may be broken without a contact where another margin still covers it. What they say:
-[register](../holes.md). Where the
-table itself lacks a margin (C5) or the ego starts in danger (C6), a contact is not held against the ego."""
+[register](../holes.md). Where the table itself lacks a margin (C5) or the ego starts in danger (C6), a contact is not
+held against the ego; without the bound of the heading it turns further than the table says, which is no duty."""
 HOSTILE = """Random meta-actions on `highway-fast-v0`, among reckless drivers, brake checkers, squeezers, swervers and
 rammers (`envs/highway/hostile.py`), judged by the whole table whatever the shield goes by. Costs: in
 stock traffic."""

@@ -16,7 +16,7 @@ SHARED = (
     "impact_speed",
     "delta_v",
 )
-SEEDS = range(10**9, 10**9 + 6)
+SEEDS = range(10**9, 10**9 + 3)
 
 
 @pytest.mark.parametrize("environment", ["highway-fast-v0", "intersection-v0"])
@@ -46,7 +46,7 @@ def test_measuring_changes_nothing():
         told = more.pop("measures")
         assert more.keys() == info.keys() and more["blame"] == info["blame"]
         done = done or cut
-    assert info["blame"] == "ego" and told["violation_ego"] > 0.0 and told["violation_other"] == 0.0
+    assert info["blame"] == "ego" and told["violation_ego"] > told["violation_other"] >= 0.0
     assert told["shield_time"] > 0.0 and told["impact_speed"] > 0.0
 
 
