@@ -80,7 +80,7 @@ def _of_run(folder: Path, figures: Path) -> Section:
             )
         )
     return Section(
-        f"{config['env_id']} ({folder.name})",
+        folder.name if folder.name == config["env_id"] else f"{config['env_id']} ({folder.name})",
         words.of_run(episodes, summary, compared),
         tables,
         list(_figures_of_run(folder, figures, config, episodes, summary)),

@@ -3,6 +3,7 @@
 import pandas as pd
 
 from rss_shield.eval.metrics import with_outcomes
+from rss_shield.eval.runs.points import metric_named
 from rss_shield.eval.stats import clopper_pearson
 
 
@@ -38,8 +39,8 @@ def of_run(episodes: pd.DataFrame, summary: pd.DataFrame, compared: pd.DataFrame
         if len(on):
             most, least = on["override_share"].idxmax(), on["override_share"].idxmin()
             shares = 100 * on["override_share"]
-            text = f"The shield overrides {shares[most]:.1f} % of the frames of who is {_cell(most)}"
-            paragraphs.append(text + (f", {shares[least]:.1f} % of who is {_cell(least)}." if most != least else "."))
+            text = f"Most frames overridden: {shares[most]:.1f} % ({_cell(most)})"
+            paragraphs.append(text + (f"; fewest: {shares[least]:.1f} % ({_cell(least)})." if most != least else "."))
     tests = compared[compared["p_holm"].notna()]
     if len(tests):
         beyond = int((tests["p_holm"] < 0.05).sum())
@@ -83,7 +84,7 @@ def of_sweep(
       axes: columns that tell points apart.
       groups: label and rows of the points that compete.
     """
-    paragraphs = []
+    paragraphs, x, y = [], metric_named(performance).label, metric_named(safety).label
     for label, rows in groups:
         points = table.iloc[rows]
         front = points[points["front"]].sort_values(performance, ascending=False)
@@ -91,7 +92,7 @@ def of_sweep(
         named = ", ".join(f"{name} = {best[name]}" for name in axes)
         where = f"{label}: " if label else ""
         paragraphs.append(
-            f"{where}{len(front)} of {len(points)} points are on the Pareto front of {safety} and {performance}. "
-            f"The best {performance} there is {best[performance]:.3g}, with {safety} {best[safety]:.3g} ({named})."
+            f"{where}{len(front)} of {len(points)} points are on the Pareto front of {y} and {x}. "
+            f"The best {x} there is {best[performance]:.3g}, with {y} {best[safety]:.3g} ({named})."
         )
     return paragraphs
