@@ -43,6 +43,7 @@ from rss_shield.eval.replay import chosen, replay
 from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import changes, open_run, recorded
+from rss_shield.eval.suite import showcase
 from rss_shield.shield.junctions.controller import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
@@ -176,6 +177,8 @@ class Config:
     """Test episodes per trained model and test condition, on the same seeds for all."""
     replay_episodes: int = 5
     """How many of these are played again on the original simulator and compared; none if it is the backend."""
+    pages: bool = True
+    """Write pages on which the worst and the most typical episode of each arm play, in runs-dir/NAME/pages."""
     removal_checks: int = 10
     """How often an agent is tested with and without the shield on its way through training, at most; 0: never."""
     removal_episodes: int = 50
@@ -223,6 +226,8 @@ def main(arguments: list[str]) -> None:
         played = [cell for cell in cells if in_engine(ARMS[cell[0]])]
         unchecked = [cell for cell in played if not replay_path(folder, *cell).exists()]
         run_jobs([replaying(config, preset, folder, *cell) for cell in unchecked], config.workers)
+    if config.pages:
+        run_jobs([showing(config, preset, folder, arm) for arm in config.arms if in_engine(ARMS[arm])], config.workers)
 
     write_report(folder)
     print(f"\nEverything is in {folder}: table.md, results.json, learning_curve.png, blame.png, ...")
@@ -413,6 +418,11 @@ def replaying(config: Config, preset: Preset, folder: Path, arm: str, seed: int,
     return Job(f"replay {arm}, seed {seed}, shield {test}", count, "episode", work)
 
 
+def showing(config: Config, preset: Preset, folder: Path, arm: str) -> Job:
+    work = functools.partial(_show, config, preset, folder, arm)
+    return Job(f"show {arm}", showcase.shown(tuple(ARMS[arm].tests)), "episode", work)
+
+
 def learner(config: Config, arm: Arm) -> Learner:
     """The learner of an arm."""
     fixed = {name: value for name, value in arm.settings.items() if name != FROM_OPTIONS}
@@ -503,6 +513,13 @@ def _replay(config: Config, preset: Preset, folder: Path, arm: str, seed: int, t
     sample = chosen(read_cell(cell_path(folder, arm, seed, test)), config.replay_episodes, seed)
     replays = replay(original(config, preset, ARMS[arm], ARMS[arm].tests[test]), sample, progress)
     write_cell(replay_path(folder, arm, seed, test), replays, arm, seed, test)
+
+
+def _show(config: Config, preset: Preset, folder: Path, arm: str, progress: Progress) -> None:
+    row, seed = ARMS[arm], config.seeds[0]
+    tests = {test: read_cell(cell_path(folder, arm, seed, test)) for test in row.tests}
+    making = {test: original(config, preset, row, shield) for test, shield in row.tests.items()}
+    showcase.show(tests, making.__getitem__, folder, arm, f"{row.label}, {config.env_id}", progress)
 
 
 def parse(arguments: list[str], default: Config) -> Config:

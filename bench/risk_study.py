@@ -21,7 +21,7 @@ import pandas as pd
 import tyro
 from matplotlib.figure import Figure
 
-from rss_shield import make
+from rss_shield import d_min_same_direction, make
 from rss_shield.envs.highway.recorder import record_trace
 from rss_shield.eval.files import atomic
 from rss_shield.eval.pages import markdown, spaced, write_page
@@ -175,8 +175,7 @@ def reaction_time(rows: pd.DataFrame, holds: Any) -> float:
 
 
 def last_moment(situation: Situation, v: float) -> float:
-    """Time before the contact at which braking at `HARD` just avoids it [s]: to the speed of who is ahead, or to "
-    "rest."""
+    """Time before the contact at which braking at `HARD` just avoids it [s]: to the other's speed, or to rest."""
     closing = v - (0.0 if situation.crosses else situation.speed)
     return closing / (2 * HARD)
 
@@ -208,8 +207,8 @@ def reaction_part(frame: pd.DataFrame, radial: pd.DataFrame) -> str:
             f"before it at which each measure begins to warn for good, the ego at {SHOWN} km/h, and in brackets from "
             f"the least to the most over {EGO_SPEEDS[0]} to {EGO_SPEEDS[-1]} km/h in steps of 10 (n = "
             f"{len(EGO_SPEEDS)}, no chance in it). Observed from {BEFORE:g} s before the contact on, so {BEFORE:.1f} "
-            f"means all along. Last moment: when braking at {HARD:g} m/s² still avoids it. RSS: longitudinally and "
-            f"laterally too near, by the parameters of a preset.",
+            f"means all along. Last moment: when braking at {HARD:g} m/s² still avoids it. TTC: toward whoever is in "
+            f"the ego's way. RSS: longitudinally and laterally too near, by the parameters of a preset.",
             markdown(rows),
             "![Risk, TTC and RSS before a contact](../risk.png)",
             _first_words(frame, radial),
@@ -241,7 +240,10 @@ def _first_words(frame: pd.DataFrame, radial: pd.DataFrame) -> str:
     never = {name: int((frame[name] == 0.0).sum()) for name in REACTIONS}
     text.append(
         f"- Later than the last moment for braking, of {len(frame)} runs: "
-        + "; ".join(f"{name} {count} (of these {never[name]} never)" for name, count in late.items())
+        + "; ".join(
+            f"{name} {count}" + (f", {never[name]} of them never" if never[name] else "")
+            for name, count in late.items()
+        )
         + "."
     )
     change = radial["RDSI unknown"] - frame["RDSI unknown"]
@@ -333,13 +335,15 @@ def play(env_id: str, shield: str, episodes: int, driver: Callable[[int, int], C
 
 def _band(looks: list[Any]) -> float:
     """Risk of an episode [s]: RDSI over the time in the unknown band."""
+    if not looks:  # a contact at once
+        return 0.0
     times, rdsi, lower, upper = np.array([(look.time, look.rdsi, look.lower, look.upper) for look in looks]).T
     return band_risk(times, rdsi, lower, upper).total
 
 
 def trained(path: Path) -> Callable[[int, int], Callable[[Any], int]]:
     """A model of train.py as a driver."""
-    from rss_shield.agents.ppo import load_policy  # takes seconds to import
+    from rss_shield.agents.load import load_policy  # takes seconds to import
 
     policy = load_policy(path)
     return lambda actions, seed: lambda observation: int(policy(observation[None])[0])
@@ -421,7 +425,8 @@ def areas_part(found: list[Case], rng: np.random.Generator) -> str:
         [
             "## SOTIF areas",
             "Share of the frames in each area by the critical source, with 95 % intervals of the bootstrap over "
-            "episodes. Off: the shield watches only.",
+            "episodes. Off: the shield watches only. Episodes end at a contact. In `merge-v0` and `intersection-v0` "
+            "the ego begins at its top speed, so FASTER and IDLE ask for the same.",
             markdown(rows),
             "![SOTIF areas](../sotif.png)",
             _areas_words(found),
@@ -492,24 +497,32 @@ def confusion_part(found: list[Case], rng: np.random.Generator) -> str:
     return "\n\n".join([*parts, markdown(rows), "\n".join(words), _overlap_words(found)])
 
 
+def _is_dangerous(frames: Frames) -> np.ndarray:
+    return frames.dangerous
+
+
+def _is_risky(frames: Frames) -> np.ndarray:
+    return frames.state > 0
+
+
+def _is_unsafe(frames: Frames) -> np.ndarray:
+    return frames.state == len(AREAS) - 1
+
+
+def _is_any(frames: Frames) -> np.ndarray:
+    return frames.state >= 0
+
+
 def _implications(road: str, shield: str, played: list[Frames], rng: np.random.Generator) -> str:
     def share(of: Callable[[Frames], Any], among: Callable[[Frames], Any]) -> str:
         return percent(ratio([(of(f) & among(f)).sum() for f in played], [among(f).sum() for f in played], rng))
 
-    def dangerous(f: Frames) -> np.ndarray:
-        return f.dangerous
-
-    def risky(f: Frames) -> np.ndarray:
-        return f.state > 0
-
-    def unsafe(f: Frames) -> np.ndarray:
-        return f.state == len(AREAS) - 1
-
     off = {"monitor": "off", "override": "on"}[shield]
     return (
-        f"- `{road}`, shield {off} ({len(played)} episodes): of RSS-dangerous frames {share(risky, dangerous)} are "
-        f"unknown or known unsafe; of unknown or unsafe frames {share(dangerous, risky)} are RSS-dangerous, of known "
-        f"unsafe ones {share(dangerous, unsafe)}."
+        f"- `{road}`, shield {off} ({len(played)} episodes): of RSS-dangerous frames "
+        f"{share(_is_risky, _is_dangerous)} are unknown or known unsafe; of unknown or unsafe frames "
+        f"{share(_is_dangerous, _is_risky)} are RSS-dangerous, of known unsafe ones "
+        f"{share(_is_dangerous, _is_unsafe)}."
     )
 
 
@@ -530,6 +543,44 @@ def _overlap_words(found: list[Case]) -> str:
 # ---------------------------------------------------------------- the page
 
 
+def summary(found: list[Case]) -> str:
+    """What it says, in words."""
+    off, on = ([case for case in found if case.shield == shield] for shield in SHIELDS)
+    unsafe = [[_share(_is_unsafe, _is_any, [case]) for case in cases] for cases in (off, on)]
+    fewer = sum(after < before for before, after in zip(*unsafe, strict=True))
+    by_road = [[[case for case in cases if case.road == road] for road in _roads(found)] for cases in (off, on)]
+    implied = [[_share(_is_risky, _is_dangerous, cases) for cases in roads] for roads in by_road]
+    back = [[_share(_is_dangerous, _is_unsafe, cases) for cases in roads] for roads in by_road]
+    ego, other = PRESETS["simulator"][:2]
+    needed = float(d_min_same_direction(25.0, 25.0, ego, other))
+    lines = [
+        f"RSS danger implies risk, mostly: with the shield off {_span(implied[0])} of the RSS-dangerous frames are "
+        f"unknown or known unsafe, by road; with it on {_span(implied[1])}.",
+        f"Risk does not imply RSS danger: of the known unsafe frames {_span(back[0])} are RSS-dangerous with the "
+        f"shield off, and {_span(back[1])} with it on. The field's standard is a headway of 1 s, which at 25 m/s is "
+        f'25 m between centres; the table of motorways ("simulator") asks for {needed:.1f} m between bumpers behind '
+        f"somebody as fast.",
+        f"With the shield on there is less time in the known unsafe area in {fewer} of {len(off)} comparisons: "
+        f"{_span(unsafe[0])} of the frames become {_span(unsafe[1])}.",
+    ]
+    return "\n".join(["## What it says", "", *(f"- {line}" for line in lines)])
+
+
+def _roads(found: list[Case]) -> list[str]:
+    return list(dict.fromkeys(case.road for case in found))
+
+
+def _span(shares: list[float]) -> str:
+    return f"{100 * min(shares):.1f} to {100 * max(shares):.1f} %"
+
+
+def _share(of: Callable[[Frames], Any], among: Callable[[Frames], Any], cases: list[Case]) -> float:
+    """Share of frames; NaN where there are none."""
+    frames = [one for case in cases for one in case.played]
+    count = sum(int(among(one).sum()) for one in frames)
+    return sum(int((of(one) & among(one)).sum()) for one in frames) / count if count else float("nan")
+
+
 def main(config: Config) -> int:
     unknown = [env_id for env_id in config.envs if env_id not in ROADS]
     if unknown:
@@ -545,7 +596,7 @@ def main(config: Config) -> int:
     if config.write:
         plot_reactions(FIGURE)
         plot_areas(found, AREA_FIGURE)
-        write_page(PAGE, [HEADER, first, areas, confusion])
+        write_page(PAGE, [HEADER, summary(found), first, areas, confusion])
     return 0
 
 

@@ -57,6 +57,7 @@ def fill(path: Path, name: str, block: str) -> None:
 # ---------------------------------------------------------------- runs of train.py
 
 
+USUAL = ("unshielded", "shielded")  # arms
 PPO_PAGE = Path("docs/results/ppo.md")
 PPO_HEADER = """# PPO with and without the shield
 
@@ -85,6 +86,8 @@ def command(config: dict[str, Any]) -> str:
     """The command line of a run, as far as the page tells of it."""
     words = ["python train.py --env-id", config["env_id"], "--total-timesteps", config["total_timesteps"], "--seeds"]
     words += config["seeds"]
+    if config.get("arms", list(USUAL)) != list(USUAL):
+        words += ["--arms", *config["arms"]]
     if config["parameters"].get("roads_cross"):
         words += ["--intent", config["intent"], "--entry", config["entry"], "--waiting", config["waiting"]]
     if config["intervention_penalty"]:

@@ -38,12 +38,12 @@ def replay(
     """
     records = []
     for seed, actions in zip(episodes["seed"], episodes["actions"].astype(str), strict=True):
-        records.append(run_episode(make_env, _playback(actions), int(seed)))
+        records.append(run_episode(make_env, playback(actions), int(seed)))
         progress(len(records))
     return pd.DataFrame(records)
 
 
-def _playback(actions: str) -> Policy:
+def playback(actions: str) -> Policy:
     """Takes the recorded actions one by one, and the last one again if the episode turns out longer."""
     recorded = [int(action) for action in actions.split()]
     upcoming = itertools.chain(recorded, itertools.repeat(recorded[-1]))

@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 from rich.console import Console
 
-from rss_shield.eval import removal
+from rss_shield.eval import multipliers, removal
 from rss_shield.eval.arms import Arm, arm_named
 from rss_shield.eval.cards import write_card
 from rss_shield.eval.files import atomic, write_json
@@ -30,7 +30,8 @@ def write_report(folder: Path) -> None:
     """Read episodes/*.csv, replays/*.csv and */learning_curve.csv of a run; print and write table, figures, results.
 
     Writes episodes.csv, results.json, table.txt, .md, .tex and .csv, learning_curve.png and .pdf, removal.png and .pdf,
-    blame.png and .pdf, the cards of the models; frontier.png and .pdf with more than two arms; replays.csv if episodes
+    blame.png and .pdf, the cards of the models; frontier.png and .pdf with more than two arms; multiplier.png and
+    .pdf where a price moved; replays.csv if episodes
     were replayed.
     """
     run = json.loads((folder / "config.json").read_text(encoding="utf-8"))
@@ -81,6 +82,9 @@ def write_report(folder: Path) -> None:
         plot_learning_curve(pd.concat(curves, ignore_index=True), folder, str(config["env_id"]))
     if len(arms) > 2:
         plot_frontier(summary, folder, str(config["env_id"]))
+    prices = multipliers.read_all(folder, models)
+    if len(prices):
+        multipliers.plot_multipliers(prices, folder, str(config["env_id"]))
     if len(removals):
         removal.plot_removal(removals, folder, str(config["env_id"]))
     plot_blame(episodes, folder, str(config["env_id"]))

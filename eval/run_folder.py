@@ -26,6 +26,7 @@ PACKAGES = (
     "stable-baselines3",
     "torch",
 )
+PAGES = "pages"  # folder in a run: episodes that play
 
 
 def open_run(folder: Path, config: dict[str, Any], *, resume: bool, overwrite: bool) -> list[str]:
@@ -130,3 +131,8 @@ def _git(*arguments: str) -> str | None:
     except OSError:
         return None
     return done.stdout.strip() if done.returncode == 0 else None
+
+
+def pages_of(folder: Path) -> tuple[Path, ...]:
+    """Pages on which episodes of a run play, by name."""
+    return tuple(sorted((folder / PAGES).glob("*.html")))

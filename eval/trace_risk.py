@@ -76,6 +76,7 @@ class _Look:
         self.along_lanes = trace.meta.get("scheme", "lanes") == "lanes"
         self.toward = _heads_for(trace, user)
         self.roads: dict[tuple[int, int, int], np.ndarray] = {}
+        self.lanes: dict[str, np.ndarray] = {}  # each as a road of its own
         lanes = trace.users.lane[:, user]
         self.after, self.before = _changes(lanes), _changes(lanes[::-1])[::-1]
         kinds = [KINDS.get(kind, CAR) for kind in trace.users.kinds]
@@ -175,7 +176,9 @@ class _Look:
     def _lines(self, lane: Lane, pose: np.ndarray) -> np.ndarray:
         """`[2]` `MARKING` records of the lines on both sides of a lane, around x, y, heading, speed."""
         lines, width = np.zeros(2, MARKING), _width(lane)
-        _, y, heading = locate(make_road(_from(lane)), *pose[:2])[:3]
+        if lane.id not in self.lanes:
+            self.lanes[lane.id] = make_road(_from(lane))
+        _, y, heading, _ = locate(self.lanes[lane.id], *pose[:2])
         across = pose[3] * np.sin(pose[2] - heading)
         for k, side in enumerate((-1, 1)):
             room = 0.5 * width - side * y  # negative beyond the line

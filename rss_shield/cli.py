@@ -9,6 +9,8 @@ COMMANDS = {
     "train": ("rss_shield.train", "train", "train with and without the shield, test, compare"),
     "test": ("rss_shield.test", "train", "test a model or a policy with the shield and without"),
     "record": ("rss_shield.eval.suite.record", "train", "play one episode and write down everything"),
+    "scenarios": ("rss_shield.eval.suite.scenarios.page", "train", "scripted situations, each derived by hand"),
+    "stress": ("rss_shield.eval.suite.stress", "train", "very many episodes, until an ego is at fault"),
     "judge": ("rss_shield.eval.suite.judge.command", "train", "who was to blame in any log"),
     "replay": ("rss_shield.eval.viewer.command", "train", "a page on which recorded episodes play"),
     "sweep": ("rss_shield.eval.suite.sweep", "train", "run every task of an experiment file, here or on a cluster"),

@@ -11,9 +11,9 @@ import numpy as np
 from numba import njit
 
 from rss_shield.shield.definitions.right_of_way import (
-    APART,
-    ORDER,
-    STOP,
+    CAN_STOP,
+    IN_ORDER,
+    IN_TIME,
     UNSEEN,
     Approach,
     clears_before,
@@ -80,9 +80,9 @@ def within(a, lower, upper, rng):
 @njit
 def respond(items, first, order, tau, v, car, brake_freely, change):
     if change == FORGETFUL:
-        items = STOP
+        items = CAN_STOP
     if change == NO_ITEM_3 and items != 0:
-        items &= ~APART
+        items &= ~IN_TIME
         if items == 0:
             return -car.a_max_brake, np.inf
     if change == SWAPPED:
@@ -98,7 +98,7 @@ def items_of(one, two, car_1, car_2, change):
     if change == AS_A_MERGE:
         endless_1 = Approach(one.enter, np.inf, one.length, one.v, one.priority)
         endless_2 = Approach(two.enter, np.inf, two.length, two.v, two.priority)
-        items |= junction_items(endless_1, endless_2, car_1, car_2) & ORDER
+        items |= junction_items(endless_1, endless_2, car_1, car_2) & IN_ORDER
     return items
 
 
@@ -134,7 +134,7 @@ def drive(start, ranks, lights, area, car_1, car_2, frames, change, rng):
         wish_2 = wish(style_2, car_2, rng) if rng.random() < restless else wish_2
         a_1, a_2 = wish_1, wish_2
         if danger.since > 0:
-            if danger.items in (STOP, ORDER, APART):
+            if danger.items in (CAN_STOP, IN_ORDER, IN_TIME):
                 seen |= danger.items
             first = rank_1 - rank_2 if change == NEW_PRIORITY else danger.priority
             free_1, free_2 = kind and not would_strand(one, car_1), kind and not would_strand(two, car_2)

@@ -100,10 +100,15 @@ def _actions(envs: Any, policy: str) -> Any:
     return np.full(envs.num_envs, envs.single_action_space.n - 2 if envs.single_action_space.n == 5 else 2)
 
 
+LEFT_OUT: set[str] = set()  # keys of infos that only one side of a comparison has
+
+
 def _take_in(digest: Any, value: Any) -> None:
     """Every number in a nest of tuples and dictionaries, in a fixed order."""
     if isinstance(value, dict):
         for key in sorted(value):
+            if key.removeprefix("_") in LEFT_OUT:
+                continue
             digest.update(key.encode())
             if key != "t":  # of gymnasium's episode statistics: seconds on the clock
                 _take_in(digest, value[key])
@@ -123,7 +128,9 @@ def main() -> None:
     parser.add_argument("--write", type=Path, help="file for the hashes")
     parser.add_argument("--compare", type=Path, help="file of earlier hashes")
     parser.add_argument("--only", default="", help="part of the names of the cases to play")
+    parser.add_argument("--without", nargs="*", default=[], help="keys of infos that are left out, e.g. new ones")
     arguments = parser.parse_args()
+    LEFT_OUT.update(arguments.without)
     warnings.filterwarnings("ignore")
     hashes = {}
     for name, case in cases():

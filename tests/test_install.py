@@ -9,6 +9,8 @@ import tomllib
 import pytest
 from places import ROOT
 
+from rss_shield.cli import COMMANDS
+
 TRAINING = (
     "torch",
     "stable_baselines3",
@@ -95,6 +97,11 @@ def test_the_shield_alone_needs_numpy_and_numba(site, tmp_path):
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_the_page_that_plays_traces_brings_its_files_along(site):
+    written = {path.name for path in (ROOT / "eval" / "viewer").glob("*.*") if path.suffix != ".py"}
+    assert written and written <= {path.name for path in (site / "rss_shield" / "eval" / "viewer").iterdir()}
+
+
 def test_a_missing_extra_is_named(site, tmp_path):
     code = "from rss_shield.cli import main; main(['train'])"
     done = python(tmp_path, code, site, ["torch"])
@@ -110,7 +117,7 @@ def test_the_command_is_the_script(site, tmp_path):
     script = subprocess.run([sys.executable, ROOT / "train.py", "--help"], capture_output=True, text=True, cwd=tmp_path)
     assert command.stdout == script.stdout != "", command.stderr
     unknown = python(tmp_path, "from rss_shield.cli import main; main(['trian'])", site)
-    assert unknown.stderr.strip() == "rss-shield: unknown command 'trian'; expected one of train, test"
+    assert unknown.stderr.strip() == f"rss-shield: unknown command 'trian'; expected one of {', '.join(COMMANDS)}"
 
 
 def test_this_environment_has_it_under_its_one_name(tmp_path):

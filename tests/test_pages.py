@@ -29,7 +29,7 @@ SCRIPTS = {
     "own_simulator": "with the shield: smallest gap",
     "intersection": "routes known: 2 of 2 arrived, the ego at fault in 0",
     "parameters_and_rules": "an ablation, judged in full: blame ego",
-    "judge_a_log": "blame: ego\nthe ego: braked less than the proper response asks",
+    "judge_a_log": "5.50 s: contact of ego and other, at fault: ego; ego braked less than the proper response asks",
     "baseline": "the shield: at fault in 0 of 5",
     "drive_and_test": "drive_and_test:drive on highway-fast-v0, 20 episodes",
 }

@@ -57,7 +57,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--removal-checks -1", "--removal-checks -1 is out of range: expected at least 0"),
         ("--total-timesteps 0", "--total-timesteps 0 is out of range: expected at least 1"),
         ("--total-timesteps many", "--total-timesteps: invalid literal for int() with base 10: 'many'"),
-        ("--seeds", "--seeds  is out of range: expected different whole numbers, 0 to 2**32 - 1"),
+        ("--seeds", "--seeds is out of range: expected different whole numbers, 0 to 2**32 - 1"),
         ("--seeds 1 1", "--seeds 1 1 is out of range: expected different whole numbers"),
         ("--seeds -1", "--seeds -1 is out of range: expected different whole numbers"),
         (

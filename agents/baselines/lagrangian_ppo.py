@@ -23,7 +23,7 @@ from rss_shield.agents.vec_env import VectorEnvAdapter
 
 COST = ("cost",)
 LEAST_SCALE = 0.005  # of errors
-GAINS: dict[str, float] = dict(kp=0.25, ki=0.25, kd=0.25, largest=50.0)
+GAINS: dict[str, float] = dict(kp=0.5, ki=0.5, kd=0.5, largest=50.0)
 HIDDEN = 128  # units in each of the two layers of the cost critic, as in the other networks
 
 

@@ -3,6 +3,9 @@
 The idea of SAILR (Wagener, Boots & Cheng, "Safe reinforcement learning using advantage-based intervention", ICML 2021):
 who needs help has lost. So the agent learns to do without, and what the shield does afterwards never flatters its
 returns. There the intervention is a rule of advantages, here it is the shield; hence "SAILR-like".
+
+An intervention is a proper response on any frame, or a change of the acceleration by more than CHANGE on average: the
+shield anticipates, so an agent that always asks for full speed hardly ever meets a proper response.
 """
 
 import numpy as np
@@ -13,6 +16,7 @@ from rss_shield.agents.learner import Learner
 from rss_shield.agents.vec_env import VectorEnvAdapter
 
 OF_EPISODE = ("blame", "crashed", "override_share", "episode_cost")  # what the learning curve asks for
+CHANGE = 1.0  # [m/s^2]
 PENALTY = 1.0  # rewards of highway-env are at most 1 per decision
 
 
@@ -24,12 +28,12 @@ def learner(penalty: float = PENALTY) -> Learner:
     """
     return ppo.learner()._replace(
         adapt=lambda env: EndsAtIntervention(env, penalty),
-        notes={**ppo.learner().notes, "penalty_at_end": penalty},
+        notes={**ppo.learner().notes, "penalty_at_end": penalty, "ends_at_change": CHANGE},
     )
 
 
 class EndsAtIntervention(VectorEnvAdapter):
-    """Ends an episode in the decision in which a proper response overrides a frame.
+    """Ends an episode in the decision in which the shield intervenes.
 
     Args:
       env: a vector environment with autoreset in the same step; this class begins further episodes where it ends one.
@@ -47,6 +51,7 @@ class EndsAtIntervention(VectorEnvAdapter):
     def step_wait(self):
         observations, rewards, ended, list_of_infos = super().step_wait()
         intervened = np.asarray(self.told("shield", "override_fraction")) > 0.0
+        intervened |= np.asarray(self.told("shield", "mean_acceleration_change")) > CHANGE
         rewards -= np.float32(self.penalty) * intervened
         self.returns += rewards
         self.lengths += 1

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rss_shield.envs.compiled import kernel
-from rss_shield.envs.decisions.foresight import KP_ACCELERATION, Aim, Seen, Stage, first_response, make_stage, within
+from rss_shield.envs.decisions.foresight import Aim, Seen, Stage, first_response, make_stage, within
+from rss_shield.envs.decisions.junctions import first_override
 from rss_shield.envs.decisions.masks import allow
 from rss_shield.envs.fast.drivers import take_meta_action
 from rss_shield.envs.fast.frame import survey
@@ -18,7 +19,7 @@ from rss_shield.envs.fast.state import EPISODE
 from rss_shield.envs.roads.network import heading_at
 from rss_shield.envs.roads.steering import PURSUIT
 from rss_shield.shield._numba.compiled import inner, part
-from rss_shield.shield.junctions.controller import CROSSING, has_plan, junction_frame
+from rss_shield.shield.junctions.controller import CROSSING, has_plan
 from rss_shield.shield.lanes.controller import Body
 
 
@@ -158,7 +159,7 @@ def _margin_that_matters(cars, episode, config, settings):
 
 @part
 def _foresee_at_junctions(e, cars, episode, sight, desk, world, batch, settings):
-    config, net = world.config[0], world.network
+    net = world.network
     car, at_line = cars[episode.ego], not settings.waits_anywhere
     before = _chosen(car)
     for a in range(len(world.labels)):
@@ -168,33 +169,21 @@ def _foresee_at_junctions(e, cars, episode, sight, desk, world, batch, settings)
         if same >= 0:
             desk.first[a] = desk.first[same]
         else:
-            passes = _leaves_a_plan(e, before.lane, cars, episode, sight, desk, world, batch, at_line, settings)
-            desk.first[a] = config.frames if passes else 0
+            desk.first[a] = _first_override(e, before.lane, cars, episode, sight, desk, world, batch, at_line, settings)
         _put_back(car, before)
 
 
 @inner
-def _leaves_a_plan(e, lane, cars, episode, sight, desk, world, batch, at_line, settings):
-    """Would the shield let the first frame of what the ego heads for now pass?"""
+def _first_override(e, lane, cars, episode, sight, desk, world, batch, at_line, settings):
+    """Frame on which the shield would change the acceleration, if the ego headed for what it heads for now."""
     n, car, roads = episode.cars - 1, cars[episode.ego], world.ways.roads.lanes
     desk.episode[0] = episode
     copy, plans = desk.episode[0], Plans(world.ways, desk.crossings)
     for i in range(n):
         desk.crossings[i] = batch.crossings[e, i]
-    scene = scene_of(cars, copy, sight, plans, settings, False)
+    scene, memory = scene_of(cars, copy, sight, plans, settings, False), desk.crossings[:n]
     changes = car.target_lane != lane and roads[car.target_lane].road == roads[lane].road
-    if changes and not has_plan(scene, desk.crossings[:n], settings.entry, at_line):
-        return False
-    report = junction_frame(
-        scene,
-        sight.samples[:n],
-        desk.crossings[:n],
-        copy,
-        KP_ACCELERATION * (car.target_speed - car.speed),
-        settings.entry,
-        at_line,
-        settings.examine,
-        True,
-        0.0,
-    )
-    return not report.overridden
+    if changes and not has_plan(scene, memory, settings.entry, at_line):
+        return 0
+    rules = settings.entry, at_line, settings.examine
+    return first_override(scene, sight.samples[:n], memory, copy, car.target_speed, world.config[0].frames, *rules)

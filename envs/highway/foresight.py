@@ -10,19 +10,13 @@ from typing import Any
 import numpy as np
 from highway_env.envs.common.action import DiscreteMetaAction
 
-from rss_shield.envs.decisions.foresight import (
-    KP_ACCELERATION,
-    Aim,
-    Seen,
-    first_response,
-    make_stage,
-    without_anticipation,
-)
+from rss_shield.envs.decisions.foresight import Aim, Seen, first_response, make_stage, without_anticipation
+from rss_shield.envs.decisions.junctions import first_override
 from rss_shield.envs.decisions.masks import allow
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.roads.steering import PURSUIT
-from rss_shield.shield.junctions.controller import has_plan, junction_frame
+from rss_shield.shield.junctions.controller import has_plan
 from rss_shield.shield.lanes.controller import Body
 
 
@@ -78,7 +72,7 @@ def _on_lanes(ego: ShieldedEgo, names: list[str], frames: int) -> np.ndarray:
 
 
 def _at_junctions(ego: JunctionEgo, names: list[str], frames: int) -> np.ndarray:
-    """`frames` for the actions whose first frame the shield would let pass, 0 for the others, `[A]`."""
+    """Frame on which the shield would change what each action asks for, `[A]`."""
     settings, vehicle = ego.settings, ego.vehicle
     before, first = vehicle.target_lane_index, np.zeros(len(names), np.int64)
     for a, name in enumerate(names):
@@ -90,11 +84,10 @@ def _at_junctions(ego: JunctionEgo, names: list[str], frames: int) -> np.ndarray
                 changed = ego._scene_of(*ego._look())
                 if not has_plan(changed, ego.crossings, *rules):
                     continue
-            asked = KP_ACCELERATION * (vehicle.target_speed - vehicle.speed)
-            report = junction_frame(
-                ego._scene(), ego.samples, ego.crossings, ego.plan, float(asked), *rules, settings.examine, True, 0.0
+            scene, speed = ego._scene(), float(vehicle.target_speed)
+            first[a] = first_override(
+                scene, ego.samples, ego.crossings, ego.plan, speed, frames, *rules, settings.examine
             )
-            first[a] = 0 if report.overridden else frames
     return first
 
 

@@ -188,8 +188,9 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         For each action the ego is played ahead on the frames of one decision, with its own control laws and the
         always-on limits, while everybody else keeps the speed along the lane and across it. An action is False if on
         any of these frames a duty would change its command, or if its lane change would be refused or taken back.
-        What anticipation would have made of it does not count. Where roads cross, only the first frame is looked at:
-        an action is False if the shield would change its command there, or refuse its lane change.
+        What anticipation would have made of it does not count. Where roads cross, everybody goes on along every way
+        that they may take, and an action is False if on one of the frames looked at, the first, every third and the
+        last, it would leave the ego no plan, or if its lane change would be refused.
 
         If no action passes, the one is True that is answered last; of several, the first of SLOWER, IDLE, LANE_LEFT,
         LANE_RIGHT, FASTER. After a contact all are True. The frame shield does not rely on any of this: it acts behind

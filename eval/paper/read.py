@@ -18,6 +18,7 @@ from rss_shield.eval.paper.compared import as_texts, comparisons
 from rss_shield.eval.paper.figures import plot_comfort, plot_profiles
 from rss_shield.eval.paper.section import Figure, Section, Table
 from rss_shield.eval.plots import plot_blame, plot_learning_curve, save
+from rss_shield.eval.run_folder import pages_of
 from rss_shield.eval.runs.points import groups_of, with_front
 from rss_shield.eval.runs.tables import plot_front, shown_metrics, texts, wide
 from rss_shield.eval.stats import Interval, interquartile_mean, probability_of_improvement
@@ -85,6 +86,7 @@ def _of_run(folder: Path, figures: Path) -> Section:
         list(_figures_of_run(folder, figures, config, episodes, summary)),
         legend(summary),
         command(config),
+        pages_of(folder),
     )
 
 

@@ -39,10 +39,10 @@ _ESCAPES = {
 }
 
 
-def as_html(title: str, sections: list[Section], footer: str) -> str:
-    """The whole page: figures are in it."""
+def as_html(title: str, sections: list[Section], footer: str, here: Path) -> str:
+    """The whole page: figures are in it, pages on which episodes play are linked by their place below `here`."""
     links = "".join(f'<a href="#s{i}">{html.escape(section.title)}</a>' for i, section in enumerate(sections))
-    body = "".join(_section(i, section) for i, section in enumerate(sections))
+    body = "".join(_section(i, section, here) for i, section in enumerate(sections))
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{_STYLE}</style></head>'
@@ -51,7 +51,7 @@ def as_html(title: str, sections: list[Section], footer: str) -> str:
     )
 
 
-def _section(number: int, section: Section) -> str:
+def _section(number: int, section: Section, here: Path) -> str:
     parts = [f'<section id="s{number}"><h2>{html.escape(section.title)}</h2>']
     parts += [f"<p>{html.escape(text)}</p>" for text in section.words if text]
     for table in section.tables:
@@ -71,6 +71,9 @@ def _section(number: int, section: Section) -> str:
             f'<figure><img alt="{caption}" src="data:image/png;base64,{data}"><figcaption>{caption} '
             f"({html.escape(figure.png.stem)}.pdf)</figcaption></figure>"
         )
+    if section.pages:
+        links = (f'<a href="{_place(page, here)}">{html.escape(page.stem)}</a>' for page in section.pages)
+        parts.append(f"<p>Watch: {', '.join(links)}</p>")
     parts += [f"<p><small>{html.escape(section.note)}</small></p>"] if section.note else []
     parts += [f"<pre>{html.escape(section.command)}</pre>"] if section.command else []
     return "\n".join([*parts, "</section>"])
@@ -90,10 +93,17 @@ def as_markdown(title: str, sections: list[Section], footer: str, here: Path) ->
         for table in section.tables:
             parts += [markdown_of(table.frame), table.caption]
         for figure in section.figures:
-            parts.append(f"![{figure.caption}]({Path(os.path.relpath(figure.png, here)).as_posix()})")
+            parts.append(f"![{figure.caption}]({_place(figure.png, here)})")
+        if section.pages:
+            parts.append("Watch: " + ", ".join(f"[{page.stem}]({_place(page, here)})" for page in section.pages))
         parts += [section.note] if section.note else []
         parts += [f"```sh\n{section.command}\n```"] if section.command else []
     return "\n\n".join([*parts, f"```text\n{footer}\n```"]) + "\n"
+
+
+def _place(path: Path, here: Path) -> str:
+    """Where a file is, seen from a folder."""
+    return Path(os.path.relpath(path, here)).as_posix()
 
 
 def as_latex(sections: list[Section]) -> str:
@@ -142,6 +152,6 @@ def escaped(text: str) -> str:
 
 def write_report(folder: Path, title: str, sections: list[Section], footer: str) -> None:
     """Write index.html, report.md and report.tex into a folder."""
-    write_text(folder / "index.html", as_html(title, sections, footer))
+    write_text(folder / "index.html", as_html(title, sections, footer, folder))
     write_text(folder / "report.md", as_markdown(title, sections, footer, folder))
     write_text(folder / "report.tex", as_latex(sections))

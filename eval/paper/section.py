@@ -24,3 +24,4 @@ class Section(NamedTuple):
     figures: list[Figure]
     note: str = ""  # what the columns mean
     command: str = ""  # that made the run
+    pages: tuple[Path, ...] = ()  # on which episodes play

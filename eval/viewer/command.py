@@ -23,4 +23,5 @@ def run(arguments: list[str]) -> None:
         write_replay_page([load(path) for path in options.traces], options.out, options.labels, options.title)
     except (OSError, ValueError) as error:
         sys.exit(f"rss-shield replay: {error}")
-    print(f"{options.out}: {len(options.traces)} episodes side by side, {options.out.stat().st_size / 1e3:.0f} kB")
+    episodes = "one episode" if len(options.traces) == 1 else f"{len(options.traces)} episodes side by side"
+    print(f"{options.out}: {episodes}, {options.out.stat().st_size / 1e3:.0f} kB")

@@ -269,11 +269,8 @@ def _series(trace: Trace, ego: Ego, settings: RiskSettings) -> dict[str, tuple[i
     acceleration = users.acceleration[:, i]
     if np.isnan(acceleration).all():  # nobody wrote down the commands
         acceleration = np.append(np.diff(users.speed[:, i]), np.nan) / trace.dt
-    risk = risk_of_trace(trace, i, settings)
     margin = np.minimum(ego.gap - ego.required, LONGEST)
     beside = np.fmin(margin[:, LEFT], margin[:, RIGHT])
-    with np.errstate(divide="ignore"):
-        inverse_ttc = np.where(np.isnan(risk.ttc), np.nan, 1.0 / risk.ttc)
     series = {
         "speed": users.speed[:, i],
         "acceleration": acceleration,
@@ -283,12 +280,20 @@ def _series(trace: Trace, ego: Ego, settings: RiskSettings) -> dict[str, tuple[i
         "jerk": np.diff(acceleration, prepend=np.nan) / trace.dt,
         "margin_ahead": margin[:, AHEAD],
         "margin_beside": beside,
-        "rdsi": risk.rdsi,
-        "lower": risk.lower,
-        "upper": risk.upper,
-        "inverse_ttc": inverse_ttc,
+        **_risk_series(trace, i, settings),
     }
     return {name: (CENTI, packed(values, CENTI)) for name, values in series.items() if np.isfinite(values).any()}
+
+
+def _risk_series(trace: Trace, user: int, settings: RiskSettings) -> dict[str, np.ndarray]:
+    """Nothing where somebody is as fast as the wave of the field, which then has no value."""
+    speeds = np.abs(trace.users.speed[trace.users.present])
+    if not speeds.max() < settings.wave_speed:
+        return {}
+    risk = risk_of_trace(trace, user, settings)
+    with np.errstate(divide="ignore"):
+        inverse_ttc = np.where(np.isnan(risk.ttc), np.nan, 1.0 / risk.ttc)
+    return {"rdsi": risk.rdsi, "lower": risk.lower, "upper": risk.upper, "inverse_ttc": inverse_ttc}
 
 
 # ---------------------------------------------------------------- words

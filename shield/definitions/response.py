@@ -5,7 +5,7 @@ import numpy as np
 from rss_shield.shield._numba.compiled import compiled
 from rss_shield.shield.definitions.kinematics import speed_envelope
 
-NEVER, LON, LAT = 0, 1, 2  # axes that were safe at the last safe sample; LON | LAT is both
+NEITHER, LON, LAT = 0, 1, 2  # axes that were safe at the last safe sample; LON | LAT is both
 AXES = {0: "inherited", LON: "longitudinal", LAT: "lateral", LON | LAT: "both"}
 REAR, FRONT, CORRECT, WRONG = 0, 1, 2, 3  # longitudinal roles of the ego; the last two where cars drive at each other
 
@@ -25,7 +25,7 @@ def step_threshold(axes, since, safe_lon, safe_lat):
       (axes, since) after this sample. Dangerous iff since > 0.
     """
     if safe_lon or safe_lat:
-        return (LON if safe_lon else NEVER) | (LAT if safe_lat else NEVER), 0
+        return (LON if safe_lon else NEITHER) | (LAT if safe_lat else NEITHER), 0
     return axes, since + 1
 
 

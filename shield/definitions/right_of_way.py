@@ -26,7 +26,7 @@ from rss_shield.shield.definitions.longitudinal import d_min_following, is_safe_
 from rss_shield.shield.definitions.response import FRONT, REAR, lateral_response, longitudinal_response
 from rss_shield.shield.geometry import signed_gap
 
-STOP, ORDER, APART = 1, 2, 4  # items of Def. 17 that hold; 0 = none: dangerous
+CAN_STOP, IN_ORDER, IN_TIME = 1, 2, 4  # items of Def. 17 that hold; 0 = none: dangerous
 
 
 class Approach(NamedTuple):
@@ -212,7 +212,7 @@ def junction_items(one, two, params_one, params_two):
       params_one, params_two: `RSSParams` of each driver.
 
     Returns:
-      The items that hold, STOP | ORDER | APART. Dangerous iff 0.
+      The items that hold, CAN_STOP | IN_ORDER | IN_TIME. Dangerous iff 0.
     """
     order = longitudinal_order(one.enter, two.enter)
     ahead = (order > 0 and is_ahead(one, two, params_one, params_two)) or (
@@ -220,7 +220,7 @@ def junction_items(one, two, params_one, params_two):
     )
     stop = non_priority_can_stop(one, two, params_one, params_two)
     apart = are_apart(one, two, params_one, params_two)
-    return (STOP if stop else 0) | (ORDER if ahead else 0) | (APART if apart else 0)
+    return (CAN_STOP if stop else 0) | (IN_ORDER if ahead else 0) | (IN_TIME if apart else 0)
 
 
 @compiled
@@ -275,9 +275,9 @@ def must_brake(items, has_priority, order):
       has_priority: the driver's route had priority over the other's at the threshold.
       order: at the threshold, +1 the driver was in front, -1 behind.
     """
-    yields = (items & STOP) != 0 and not has_priority
-    follows = (items & ORDER) != 0 and order < 0
-    return items == 0 or yields or follows or (items & APART) != 0
+    yields = (items & CAN_STOP) != 0 and not has_priority
+    follows = (items & IN_ORDER) != 0 and order < 0
+    return items == 0 or yields or follows or (items & IN_TIME) != 0
 
 
 @compiled

@@ -36,7 +36,7 @@ LO, HI, RIGHT, LEFT, COS_RIGHT, SIN_RIGHT, COS_LEFT, SIN_LEFT, ANEW = range(9)
 ROW_FIELDS = 9
 
 # how a road user that came to rest within its response time may set out again
-NEVER, BACKWARDS, ANY_WAY = 0, 1, 2
+STAYS_PUT, BACKWARDS, ANY_WAY = 0, 1, 2
 
 # Def. 22: who brakes to keep the pair safe; the proper response that each item asks for
 FIRST_BRAKES, SECOND_BRAKES, BOTH_BRAKE, DANGEROUS = range(4)
@@ -61,10 +61,10 @@ class Steering(NamedTuple):
     yaw_acceleration: float  # largest change of its yaw rate during the response time [rad/s^2]
     min_radius: float  # of its turns                                                 [m]
     keeps_turning: bool  # afterwards on the circle that it is on; else straight on
-    sets_out: int  # NEVER, BACKWARDS or ANY_WAY, once at rest within the response time
+    sets_out: int  # STAYS_PUT, BACKWARDS or ANY_WAY, once at rest within the response time
 
 
-VEHICLE = Steering(0.3, 3.5, True, NEVER)  # CARLA, RssCheck.cpp
+VEHICLE = Steering(0.3, 3.5, True, STAYS_PUT)  # CARLA, RssCheck.cpp
 CHANGES_GEAR = VEHICLE._replace(sets_out=BACKWARDS)  # a car that is being parked
 PEDESTRIAN = Steering(np.inf, 2.0, False, ANY_WAY)  # CARLA, RssCheck.cpp; a standing one may walk anywhere
 
@@ -334,7 +334,7 @@ def _turn(t, side, mover, driver, steering, brakes):
     if brakes:
         further = _most(t, mover.v, driver, True) - way
     else:
-        slowest = larger(mover.v - driver.a_max_brake * rho, 0.0) if steering.sets_out == NEVER else 0.0
+        slowest = larger(mover.v - driver.a_max_brake * rho, 0.0) if steering.sets_out == STAYS_PUT else 0.0
         v = smaller(v, larger(slowest, w * radius))
         further = response_distance(v, t - rho, driver.a_max_accel, driver.v_cap)
     return angle + further * smaller(1.0 / radius, w / v)

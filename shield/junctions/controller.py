@@ -239,6 +239,23 @@ def has_plan(scene, memory, entry, at_line):
     )
 
 
+@apart
+def leaves_plan(scene, samples, memory, wish, entry, at_line, which):
+    """Would one frame of what the ego's controller asks for leave a plan that stays clear of everybody?
+
+    Args:
+      wish: acceleration asked for [m/s^2].
+      scene, samples, memory, entry, at_line, which: as in `junction_frame`.
+    """
+    slack = SLACK + scene.drift
+    sort_out(scene, memory, entry)
+    examine(scene, samples, which, slack)
+    a = limit(wish, scene.track.v, scene.ego, scene.dt)
+    if stop_conflict(scene, a, EVERYBODY, at_line, slack) == NEVER:
+        return True
+    return go_plan(scene, a, EVERYBODY, at_line, slack)[0] >= 0
+
+
 @compiled
 def limit(a, v, ego, dt):
     """Limits that always hold: never harder than the parameters say, never backwards [m/s^2]."""

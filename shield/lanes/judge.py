@@ -21,7 +21,7 @@ from rss_shield.shield.chosen import how_many, which
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import forward_reach, speed_envelope, travel
 from rss_shield.shield.definitions.lateral import approach_no_credit
-from rss_shield.shield.definitions.response import FRONT, LAT, LON, NEVER, lateral_speed_limit, longitudinal_response
+from rss_shield.shield.definitions.response import FRONT, LAT, LON, NEITHER, lateral_speed_limit, longitudinal_response
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, owes, remember, role_of_ego, role_of_other
 from rss_shield.shield.lanes.pair import assess, head_on_braking, is_following
 from rss_shield.shield.sampling import euler_margin, lateral_euler_margin, sampled_approach, slowest_in_danger
@@ -89,7 +89,7 @@ def judge_motion_in(memory, ego, user, table, ahead, slack, step):
         longer_ego = ego.half_length - memory.half_length_ego
         longer_other = user.half_length - memory.half_length_other
         # danger from the start is counted from its first sample, any other from the safe one before
-        tau = (memory.since - (memory.axes == NEVER) + ahead) * dt
+        tau = (memory.since - (memory.axes == NEITHER) + ahead) * dt
         if not is_following(memory.v_ego, memory.v_other, memory.opposite):
             sign = 1.0 if memory.ego_is_rear else -1.0
             b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, table.ego, table.other)
@@ -257,7 +257,7 @@ def judge_contact(ego, user, memory, table):
 @compiled
 def sum_up(memory):
     """`Verdict` of a contact by what is remembered of the pair."""
-    never_safe = memory.axes == NEVER
+    never_safe = memory.axes == NEITHER
     return judged(NOBODY if memory.since == 0 else who_broke(memory, never_safe), memory.axes, memory)
 
 

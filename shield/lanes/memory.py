@@ -14,7 +14,7 @@ from rss_shield.shield.definitions.response import (
     FRONT,
     LAT,
     LON,
-    NEVER,
+    NEITHER,
     REAR,
     WRONG,
     lateral_speed_limit,
@@ -27,7 +27,7 @@ MEMORY = np.dtype(
         ("age", "i8"),  # samples taken in since first sight, 0 = not seen yet
         ("skipped", "?"),  # the last sample was safe beyond doubt and is not taken in yet
         ("since", "i8"),  # frames since the last safe sample; 0 = safe now
-        ("axes", "i8"),  # axes safe at that sample; NEVER = danger from the start
+        ("axes", "i8"),  # axes safe at that sample; NEITHER = danger from the start
         # roles and state at the threshold t_b (at first sight where danger was there from the start)
         ("ego_is_rear", "?"),
         ("opposite", "?"),
@@ -145,13 +145,13 @@ def forget_safe(memory):
     """
     if memory.since == 0:
         memory.skipped = memory.skipped or memory.age > 0
-        memory.age, memory.axes = 0, NEVER
+        memory.age, memory.axes = 0, NEITHER
 
 
 @compiled
 def owes(memory, axis):
     """Does this pair owe a response on `axis` now? Danger from the start is answered on both."""
-    return memory.since > 0 and (memory.axes == NEVER or (memory.axes & axis) != 0)
+    return memory.since > 0 and (memory.axes == NEITHER or (memory.axes & axis) != 0)
 
 
 # ---------------------------------------------------------------- roles at the threshold
@@ -256,7 +256,7 @@ def merge(bounds, memory, params, rules, dt):
     a_upper = bounds.a_upper
     braking = owes_braking(memory, rules)
     if braking != 0:
-        inherited = braking == 1 and memory.axes == NEVER and rules.brake_if_inherited
+        inherited = braking == 1 and memory.axes == NEITHER and rules.brake_if_inherited
         a_upper = min(a_upper, -params.a_max_brake if inherited else -params.a_min_brake)
     bounds = Bounds(
         bounds.a_lower, a_upper, bounds.left, bounds.right, bounds.left_next, bounds.right_next, bounds.v_lower

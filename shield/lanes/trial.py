@@ -26,7 +26,7 @@ PAIR_FRAME = np.dtype(
     [
         ("present", "?"),
         ("dangerous", "?"),
-        ("axes", "i8"),  # safe at the threshold: LON | LAT, NEVER = inherited; while it is safe: safe now
+        ("axes", "i8"),  # safe at the threshold: LON | LAT, NEITHER = inherited; while it is safe: safe now
         ("since", "i8"),  # frames since the threshold, 0 = safe now
         ("ego_is_rear", "?"),
         ("opposite", "?"),

@@ -45,9 +45,8 @@ def _judged(info):
 
 
 def _rest(info):
-    kept = {
-        key: value for key, value in info["shield"].items() if key not in JUDGED_IN_A_STEP and key != "proposed_action"
-    }
+    actions = ("proposed_action", "executed_action")
+    kept = {key: value for key, value in info["shield"].items() if key not in (*JUDGED_IN_A_STEP, *actions)}
     return {key: info[key] for key in ("override_share", "min_ttc", "time", "raw_reward")} | kept
 
 

@@ -12,7 +12,7 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import heading_of, reach_of, road_through
 from rss_shield.envs.worlds.random_roads import Element, Pose, advance, lane_beside
-from rss_shield.shield.definitions.response import NEVER
+from rss_shield.shield.definitions.response import NEITHER
 from rss_shield.shield.geometry import AROUND, locate, nearest_piece
 from rss_shield.shield.params import Table
 
@@ -165,7 +165,7 @@ def test_a_danger_that_begins_on_another_piece_of_the_road_is_not_inherited(radi
         if ego.memory["since"][0] > 0:
             dangers.append(ego.memory["axes"][0])
     assert not ego.has_contact and vehicle.speed < 0.05
-    assert dangers and NEVER not in dangers
+    assert dangers and NEITHER not in dangers
 
 
 # ---------------------------------------------------------------- forks

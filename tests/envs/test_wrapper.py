@@ -137,7 +137,8 @@ def test_every_info_has_the_documented_keys():
         "partner",
         "response",
     }
-    for step_info, more in ((info, set()), (env.step(3)[4], {"proposed_action"})):
+    of_decisions = {"proposed_action", "executed_action", "action_replaced"}
+    for step_info, more in ((info, set()), (env.step(3)[4], of_decisions)):
         assert set(step_info["shield"]) == shield_keys | more
         assert all(np.ndim(value) == 0 for value in step_info["shield"].values())
         assert {"cost", "blame", "blame_evidence", "override_share", "episode_cost", "min_ttc"} <= set(step_info)

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from result_tables import episodes_of
 
-from rss_shield.eval import frontier, removal
+from rss_shield.eval import frontier, multipliers, removal
 from rss_shield.eval.cards import write_card
 from rss_shield.eval.metrics import summarise
 
@@ -67,6 +67,19 @@ def test_the_figure_has_every_arm(tmp_path):
     with Image.open(tmp_path / "removal.png") as image:
         image.load()
     assert (tmp_path / "removal.pdf").exists()
+
+
+def test_the_figure_of_multipliers_has_the_arms_that_have_one(tmp_path):
+    (tmp_path / "adaptive-penalty-seed1").mkdir()
+    text = "timesteps,measured,target,multiplier\n64,3.0,0.5,0.02\n128,1.0,0.5,0.04\n"
+    (tmp_path / "adaptive-penalty-seed1" / "multiplier.csv").write_text(text)
+    rows = multipliers.read_all(tmp_path, [("shielded", 1), ("adaptive-penalty", 1)])
+    assert list(rows["arm"]) == ["adaptive-penalty"] * 2
+    assert list(rows["multiplier"]) == [0.02, 0.04]
+    multipliers.plot_multipliers(rows, tmp_path, "a road")
+    with Image.open(tmp_path / "multiplier.png") as image:
+        image.load()
+    assert len(multipliers.read_all(tmp_path, [("shielded", 1)])) == 0
 
 
 def summary():

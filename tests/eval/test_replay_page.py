@@ -75,6 +75,13 @@ def test_a_page_says_who_is_to_blame_and_why():
     assert [event["kind"] for event in episode["events"]] == ["danger begins", "contact", "verdict"]
 
 
+def test_who_is_too_fast_for_the_field_is_shown_without_it():
+    trace = cut_in(True)
+    fast = trace.replaced(users=replace(trace.users, speed=trace.users.speed + 20.0))  # 45 m/s, the wave is as slow
+    (ego,) = data_of(replay_page([fast]))["episodes"][0]["egos"]
+    assert "speed" in ego["series"] and "rdsi" not in ego["series"]
+
+
 def test_a_page_asks_for_nothing_from_elsewhere():
     page = replay_page([cut_in(True)], title="<b>&")
     assert not re.search(r"""(src|href|url)\s*[=(]|@import|https?:""", page.split('<script id="data"')[0])

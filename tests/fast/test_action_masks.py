@@ -9,6 +9,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 import rss_shield
 from rss_shield.envs.decisions.masks import FASTER, LANE_LEFT, SLOWER
+from rss_shield.shield.filters.answer import FILTERS
 
 MOTORWAYS = ("highway-fast-v0", "merge-v0", "exit-v0", "two-way-v0")
 JUNCTIONS = ("intersection-v0", "roundabout-v0")
@@ -199,7 +200,9 @@ def test_an_unmasked_action_is_executed_as_proposed_and_a_masked_one_is_not():
     assert (executed != FASTER).any()
 
 
-@pytest.mark.parametrize("options", [{"filter": "ttc"}, {"replace": "decision"}, {"correction": "response"}])
+@pytest.mark.parametrize(
+    "options", [*({"filter": name} for name in FILTERS), {"replace": "decision"}, {"correction": "response"}]
+)
 def test_a_monitor_changes_nothing_whatever_it_would_do(options):
     plain, other = (rss_shield.make_vec("highway-fast-v0", E, "monitor", **given) for given in ({}, options))
     rng = np.random.default_rng(0)
@@ -214,7 +217,7 @@ def test_a_monitor_changes_nothing_whatever_it_would_do(options):
 
 
 @pytest.mark.parametrize("options", [{}, CONTINUOUS], ids=["meta", "continuous"])
-@pytest.mark.parametrize("name", ["ttc", "distance-45m", "cbf", "limits", "literal-def10"])
+@pytest.mark.parametrize("name", FILTERS[1:])
 def test_other_filters_agree_on_both_simulators(name, options):
     config = FEW["highway-fast-v0"] | options
     stock = rss_shield.make("highway-fast-v0", filter=name, config=config)

@@ -35,7 +35,7 @@ from rss_shield.shield.definitions.response import (
     FRONT,
     LAT,
     LON,
-    NEVER,
+    NEITHER,
     REAR,
     WRONG,
     braking_owed,
@@ -44,9 +44,9 @@ from rss_shield.shield.definitions.response import (
     step_threshold,
 )
 from rss_shield.shield.definitions.right_of_way import (
-    APART,
-    ORDER,
-    STOP,
+    CAN_STOP,
+    IN_ORDER,
+    IN_TIME,
     UNSEEN,
     Approach,
     can_stop_before,
@@ -263,11 +263,11 @@ def safe_axes(step, opposite):
 
 def responses(steps, opposite):
     """What the library asks of the ego at each step: braking name of each axis as the vectors write it."""
-    axes, since, rows = NEVER, 0, []
+    axes, since, rows = NEITHER, 0, []
     for step in steps:
         safe_lon, safe_lat, on_the_right = safe_axes(step, opposite)
         axes, since = step_threshold(axes, since, safe_lon, safe_lat)
-        owed = 0 if since == 0 else (LON | LAT if axes == NEVER else axes)
+        owed = 0 if since == 0 else (LON | LAT if axes == NEITHER else axes)
         role = (CORRECT if step["ego"]["correct"] else WRONG) if opposite else REAR
         if not opposite and step["lon_position"] == "InFront":
             role = FRONT
@@ -597,7 +597,7 @@ def test_without_priority_all_must_be_able_to_stop_not_one():
     ego, other, ego_params, other_params = steps[1]
     assert can_stop_before(other.enter, other.v, other_params) and not can_stop_before(ego.enter, ego.v, ego_params)
     (first, brakes_first), (second, brakes_second) = junction_steps(steps)
-    assert (first & STOP, second) == (0, 0)
+    assert (first & CAN_STOP, second) == (0, 0)
     assert not brakes_first and brakes_second
 
 
@@ -624,9 +624,13 @@ def test_a_car_with_priority_brakes_too_if_both_could_have_stopped():
     vector = VECTORS["intersection-011"]
     assert vector["wheel"]["steps"][1]["lon"] == "None"
     (first, brakes_first), (second, brakes_second) = junction_steps(intersection_steps(vector["inputs"]))
-    assert (first, second) == (STOP | APART, 0)
+    assert (first, second) == (CAN_STOP | IN_TIME, 0)
     assert not brakes_first and brakes_second
-    assert must_brake(STOP | APART, True, -1.0) and not must_brake(STOP, True, -1.0) and must_brake(ORDER, True, -1.0)
+    assert (
+        must_brake(CAN_STOP | IN_TIME, True, -1.0)
+        and not must_brake(CAN_STOP, True, -1.0)
+        and must_brake(IN_ORDER, True, -1.0)
+    )
 
 
 # ---------------------------------------------------------------- nothing is forgotten

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rss_shield.shield.definitions.response import LAT, LON, NEVER, step_threshold
+from rss_shield.shield.definitions.response import LAT, LON, NEITHER, step_threshold
 from rss_shield.shield.lanes.memory import MEMORY, owes
 
 S, U = True, False  # safe, unsafe
@@ -13,7 +13,7 @@ S, U = True, False  # safe, unsafe
 
 def follow(safe_lon, safe_lat):
     """(dangerous, sample of the threshold, axes safe there) at every sample of one pair."""
-    axes, since, seen_safe, history = NEVER, 0, False, []
+    axes, since, seen_safe, history = NEITHER, 0, False, []
     for k, (lon, lat) in enumerate(zip(safe_lon, safe_lat, strict=True)):
         axes, since = step_threshold(axes, since, lon, lat)
         seen_safe = seen_safe or lon or lat
@@ -48,14 +48,14 @@ def test_side_by_side_driving_is_longitudinally_unsafe_and_harmless():
 
 
 def test_danger_from_the_start_has_no_threshold():
-    assert follow([U, U], [U, U]) == [(True, None, NEVER), (True, None, NEVER)]
+    assert follow([U, U], [U, U]) == [(True, None, NEITHER), (True, None, NEITHER)]
 
 
 def test_a_new_episode_starts_a_new_threshold():
     history = follow([S, U, U, S, U], [U, U, U, U, U])
     assert history == [SAFE, (True, 0, LON), (True, 0, LON), SAFE, (True, 3, LON)]
     # inherited danger ends for good at the first safe sample
-    assert follow([U, S, U], [U, U, U]) == [(True, None, NEVER), SAFE, (True, 1, LON)]
+    assert follow([U, S, U], [U, U, U]) == [(True, None, NEITHER), SAFE, (True, 1, LON)]
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 4])
@@ -67,22 +67,22 @@ def test_every_short_history_obeys_the_definition(length):
             last_safe = [i for i in range(k + 1) if lon[i] or lat[i]]
             if dangerous and last_safe:
                 assert threshold == last_safe[-1]
-                assert axes == (LON if lon[threshold] else NEVER) | (LAT if lat[threshold] else NEVER)
+                assert axes == (LON if lon[threshold] else NEITHER) | (LAT if lat[threshold] else NEITHER)
             elif dangerous:
-                assert (threshold, axes) == (None, NEVER)
+                assert (threshold, axes) == (None, NEITHER)
 
 
 def test_a_pair_owes_a_response_only_in_danger_and_only_on_the_axes_that_were_safe():
     memory = np.zeros(1, MEMORY)[0]
-    for axes in (NEVER, LON, LAT, LON | LAT):
+    for axes in (NEITHER, LON, LAT, LON | LAT):
         memory["axes"], memory["since"] = axes, 0
         assert not owes(memory, LON) and not owes(memory, LAT)
         memory["since"] = 3
-        assert owes(memory, LON) == (axes in (NEVER, LON, LON | LAT))
-        assert owes(memory, LAT) == (axes in (NEVER, LAT, LON | LAT))
+        assert owes(memory, LON) == (axes in (NEITHER, LON, LON | LAT))
+        assert owes(memory, LAT) == (axes in (NEITHER, LAT, LON | LAT))
 
 
 def test_a_new_memory_is_all_zeros_and_not_dangerous():
     memory = np.zeros(1, MEMORY)[0]
     assert not owes(memory, LON) and not owes(memory, LAT)
-    assert step_threshold(memory["axes"], memory["since"], U, U) == (NEVER, 1)
+    assert step_threshold(memory["axes"], memory["since"], U, U) == (NEITHER, 1)

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from rss_shield.shield.definitions.kinematics import reach
 from rss_shield.shield.definitions.longitudinal import d_min_same_direction
 from rss_shield.shield.definitions.right_of_way import (
-    APART,
-    ORDER,
-    STOP,
+    CAN_STOP,
+    IN_ORDER,
+    IN_TIME,
     Approach,
     are_apart,
     can_stop_before,
@@ -76,12 +76,12 @@ def test_only_cars_without_priority_must_be_able_to_stop_and_of_equals_all(rank_
     one, two = crossing(40.0, 10.0, rank_one), crossing(30.0, 10.0, rank_two)
     assert non_priority_can_stop(one, two, CAR, CAR) == holds
     assert non_priority_can_stop(two, one, CAR, CAR) == holds
-    assert bool(junction_items(one, two, CAR, CAR) & STOP) == holds
+    assert bool(junction_items(one, two, CAR, CAR) & CAN_STOP) == holds
 
 
 def test_a_car_without_priority_that_is_inside_is_not_excused_by_item_1():
     one, two = crossing(-2.0, 0.0, 0), crossing(50.0, 10.0, 1)
-    assert not junction_items(one, two, CAR, CAR) & STOP
+    assert not junction_items(one, two, CAR, CAR) & CAN_STOP
 
 
 # ---------------------------------------------------------------- item 2
@@ -106,7 +106,7 @@ def test_on_a_crossing_the_first_car_may_stop_inside_so_the_second_stays_out():
 
 
 def test_two_cars_equally_near_have_no_order():
-    assert not junction_items(merge(-50.0, 30.0), merge(-50.0, 0.0), CAR, CAR) & ORDER
+    assert not junction_items(merge(-50.0, 30.0), merge(-50.0, 0.0), CAR, CAR) & IN_ORDER
 
 
 # ---------------------------------------------------------------- item 3
@@ -211,5 +211,5 @@ def test_a_car_arrives_exactly_if_it_cannot_stop(d, v):
 @given(distances, speeds, distances, speeds)
 def test_both_able_to_stop_is_item_1_without_priority_and_item_3(d_1, v_1, d_2, v_2):
     one, two = crossing(d_1, v_1), crossing(d_2, v_2)
-    if junction_items(one, two, CAR, LATE) & STOP:
-        assert junction_items(one, two, CAR, LATE) & APART
+    if junction_items(one, two, CAR, LATE) & CAN_STOP:
+        assert junction_items(one, two, CAR, LATE) & IN_TIME

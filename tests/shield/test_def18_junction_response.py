@@ -25,9 +25,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rss_shield.shield.definitions.right_of_way import (
-    APART,
-    ORDER,
-    STOP,
+    CAN_STOP,
+    IN_ORDER,
+    IN_TIME,
     UNSEEN,
     Approach,
     junction_response,
@@ -48,11 +48,11 @@ RANKS = {"first has priority": (1.0, 0.0), "second has priority": (0.0, 1.0), "n
     ("items", "with_priority", "without"),
     [
         # each as (in front, behind)
-        (STOP, (False, False), (True, True)),
-        (ORDER, (False, True), (False, True)),
-        (APART, (True, True), (True, True)),
-        (STOP | ORDER, (False, True), (True, True)),
-        (STOP | APART, (True, True), (True, True)),
+        (CAN_STOP, (False, False), (True, True)),
+        (IN_ORDER, (False, True), (False, True)),
+        (IN_TIME, (True, True), (True, True)),
+        (CAN_STOP | IN_ORDER, (False, True), (True, True)),
+        (CAN_STOP | IN_TIME, (True, True), (True, True)),
         (0, (True, True), (True, True)),  # never was safe
     ],
 )
@@ -70,14 +70,14 @@ def test_somebody_brakes_whatever_was_lost():
 
 
 def test_bounds_are_those_of_a_rear_car_for_who_brakes_and_of_a_front_car_for_who_does_not():
-    assert junction_response(APART, True, 1.0, 0.9, 10.0, CAR, False) == (-8.0, 3.5)
-    assert junction_response(APART, True, 1.0, 1.0, 10.0, CAR, False) == BRAKING
-    assert junction_response(APART, True, 1.0, 1.0, 0.0, CAR, False) == (0.0, 0.0)
-    assert junction_response(STOP, True, 1.0, 1.0, 10.0, CAR, False) == FREE
+    assert junction_response(IN_TIME, True, 1.0, 0.9, 10.0, CAR, False) == (-8.0, 3.5)
+    assert junction_response(IN_TIME, True, 1.0, 1.0, 10.0, CAR, False) == BRAKING
+    assert junction_response(IN_TIME, True, 1.0, 1.0, 0.0, CAR, False) == (0.0, 0.0)
+    assert junction_response(CAN_STOP, True, 1.0, 1.0, 10.0, CAR, False) == FREE
 
 
 def test_a_car_with_priority_may_brake_for_a_runner_unless_that_strands_it():
-    assert junction_response(STOP, True, 1.0, 1.0, 10.0, CAR, True) == BRAKING
+    assert junction_response(CAN_STOP, True, 1.0, 1.0, 10.0, CAR, True) == BRAKING
     # 10 m/s comes to rest after 12.5 m
     for enter, leave, strands in ((13.0, 28.0, False), (5.0, 20.0, True), (-5.0, 12.6, True), (-5.0, 12.4, False)):
         assert would_strand(Approach(enter, leave, 5.0, 10.0, 1.0), CAR) == strands
@@ -85,12 +85,24 @@ def test_a_car_with_priority_may_brake_for_a_runner_unless_that_strands_it():
 
 def test_the_threshold_is_the_last_sample_at_which_any_item_held():
     near, far = Approach(5.0, 20.0, 5.0, 10.0, 0.0), Approach(50.0, 65.0, 5.0, 10.0, 1.0)
-    samples = [(near, far, STOP | ORDER), (far, near, APART), (near, far, 0), (near, near, 0), (near, near, STOP)]
+    samples = [
+        (near, far, CAN_STOP | IN_ORDER),
+        (far, near, IN_TIME),
+        (near, far, 0),
+        (near, near, 0),
+        (near, near, CAN_STOP),
+    ]
     memory, rows = UNSEEN, []
     for one, two, items in samples:
         memory = step_junction(memory, one, two, items)
         rows.append(tuple(memory))
-    assert rows == [(STOP | ORDER, 1, -1, 0), (APART, -1, 1, 0), (APART, -1, 1, 1), (APART, -1, 1, 2), (STOP, 0, 0, 0)]
+    assert rows == [
+        (CAN_STOP | IN_ORDER, 1, -1, 0),
+        (IN_TIME, -1, 1, 0),
+        (IN_TIME, -1, 1, 1),
+        (IN_TIME, -1, 1, 2),
+        (CAN_STOP, 0, 0, 0),
+    ]
     assert tuple(step_junction(UNSEEN, near, far, 0)) == (0, 0, 0, 1)
 
 
@@ -113,9 +125,9 @@ def test_started_safe_two_lawful_cars_never_meet(drivers, ranks, area):
     assert overlaps == 0
     # nobody was tame: many were safe, many got through, and each item was once all that had held
     assert safe + more_safe > 8000 and through + more_through > 3000
-    alone = ORDER if ranks[0] == ranks[1] else STOP | ORDER
+    alone = IN_ORDER if ranks[0] == ranks[1] else CAN_STOP | IN_ORDER
     assert (lost | more_lost) & alone == alone
-    assert area == math.inf or (lost | more_lost) & APART
+    assert area == math.inf or (lost | more_lost) & IN_TIME
 
 
 @pytest.mark.parametrize("drivers", DRIVERS.values(), ids=DRIVERS.keys())

@@ -29,7 +29,7 @@ from rss_shield.shield.definitions.response import (
     FRONT,
     LAT,
     LON,
-    NEVER,
+    NEITHER,
     REAR,
     WRONG,
     lateral_response,
@@ -181,11 +181,11 @@ def headway_table(set, v):
 
 
 def def9_threshold(scenario, long_safe, lat_safe):
-    kinds = {NEVER: "both", LON: "long", LAT: "lat", LON | LAT: "both"}
-    axes, since, rows = NEVER, 0, []
+    kinds = {NEITHER: "both", LON: "long", LAT: "lat", LON | LAT: "both"}
+    axes, since, rows = NEITHER, 0, []
     for k, (lon, lat) in enumerate(zip(long_safe, lat_safe, strict=True)):
         axes, since = step_threshold(axes, since, lon, lat)
-        threshold = None if since == 0 or axes == NEVER else k - since
+        threshold = None if since == 0 or axes == NEITHER else k - since
         rows.append([since > 0, threshold, kinds[axes] if since > 0 else None])
     return rows
 

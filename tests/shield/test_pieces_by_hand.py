@@ -10,7 +10,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.shield._numba.compiled import compiled
-from rss_shield.shield.definitions.response import LAT, LON, NEVER
+from rss_shield.shield.definitions.response import LAT, LON, NEITHER
 from rss_shield.shield.geometry import make_road
 from rss_shield.shield.junctions.plans import THREAT, farthest, fastest, nearest
 from rss_shield.shield.lanes.controller import always_on
@@ -135,14 +135,14 @@ def test_what_was_safe_before_a_jump_is_forgotten_and_danger_is_not():
     memory["age"], memory["axes"], memory["since"] = 9, LON | LAT, [0, 4]
     for record in memory:
         forget_safe(record)
-    assert list(memory["axes"]) == [NEVER, LON | LAT]
+    assert list(memory["axes"]) == [NEITHER, LON | LAT]
     assert list(memory["age"]) == [0, 9]
 
 
 @pytest.mark.parametrize(("broke", "verdict"), [(0, INHERITED), (TOO_WEAK, EGO)])
 def test_danger_from_the_start_is_the_egos_fault_where_it_did_not_answer(broke, verdict):
     memory = np.zeros(1, MEMORY)[0]
-    memory["age"], memory["since"], memory["axes"], memory["ego_broke"] = 9, 8, NEVER, broke
+    memory["age"], memory["since"], memory["axes"], memory["ego_broke"] = 9, 8, NEITHER, broke
     memory["ego_is_rear"], memory["half_width_ego"], memory["half_width_other"] = True, 1.0, 1.0
     memory["half_length_ego"] = memory["half_length_other"] = 2.5
     memory["v_ego"] = 20.0  # its share: farther than it has got

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rss_shield.shield.definitions.right_of_way import STOP, Approach, must_brake, non_priority_can_stop
+from rss_shield.shield.definitions.right_of_way import CAN_STOP, Approach, must_brake, non_priority_can_stop
 from rss_shield.shield.definitions.signals import (
     GREEN,
     RED,
@@ -140,6 +140,6 @@ def test_between_a_car_that_keeps_its_right_and_a_newcomer_on_green_nobody_has_p
     inside, newcomer = Approach(-5.0, 20.0, 5.0, 2.0, kept), Approach(60.0, 85.0, 5.0, 10.0, 1.0)
     # the one inside cannot stop before the area any more: item 1 does not hold, and if it had, both would owe braking
     assert not non_priority_can_stop(inside, newcomer, CAR, CAR)
-    assert must_brake(STOP, newcomer.priority > inside.priority, -1.0)
+    assert must_brake(CAN_STOP, newcomer.priority > inside.priority, -1.0)
     # by the light alone the newcomer would have priority and need not brake
-    assert not must_brake(STOP, newcomer.priority > 0.0, -1.0)
+    assert not must_brake(CAN_STOP, newcomer.priority > 0.0, -1.0)

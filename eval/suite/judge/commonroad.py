@@ -72,10 +72,12 @@ def _states(obstacle: Any) -> dict[int, tuple[float, float, float, float]]:
     path = obstacle.prediction.trajectory.state_list if obstacle.prediction is not None else []
     for state in [obstacle.initial_state, *path]:
         position = getattr(state.position, "center", state.position)  # a set has a centre
-        v = float(state.velocity)
-        if getattr(state, "velocity_y", None) is not None:  # a point mass
-            v = float(np.hypot(state.velocity, state.velocity_y))
-        found[int(state.time_step)] = float(position[0]), float(position[1]), float(state.orientation), v
+        v, attributes = float(state.velocity), state.attributes
+        if "orientation" in attributes:
+            angle = state.orientation
+        else:  # a point mass: velocities along x and y
+            v, angle = float(np.hypot(v, state.velocity_y)), np.arctan2(state.velocity_y, v)
+        found[int(state.time_step)] = float(position[0]), float(position[1]), float(angle), v
     return found
 
 

@@ -104,8 +104,8 @@ def read_csv(
             table["heading"] *= -1.0
     twice = table.duplicated(["id", "t"])
     if twice.any():
-        row = table[twice].iloc[0]
-        raise ValueError(f"{path}: {known.id} = {row['id']} is there twice at {known.t} = {row['t']:g}: expected once")
+        user, t = table.loc[twice, "id"].iloc[0], table.loc[twice, "t"].iloc[0]
+        raise ValueError(f"{path}: {known.id} = {user} is there twice at {known.t} = {t:g}: expected once")
     step = dt or _step(path, table["t"].to_numpy())
     start, end = float(table["t"].min()), float(table["t"].max())
     time = start + np.arange(round((end - start) / step) + 1) * step

@@ -1,0 +1,142 @@
+"""`rss-shield scenarios`: play all of them, say whether they come out as derived, and write the page of results."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from rss_shield.eval.files import write_text
+from rss_shield.eval.suite.judge.judgement import judge_trace
+from rss_shield.eval.suite.judge.pictures import draw
+from rss_shield.eval.suite.scenarios.catalogue import SCENARIOS
+from rss_shield.eval.suite.scenarios.stage import LITERAL, Result, Scenario, play
+from rss_shield.shield.trace import save
+from rss_shield.shield.verdicts import AT_FAULT
+
+EARLIER, LATER = 0.3, 0.11  # danger may be seen so much before and after the time of the formulas [s]
+
+
+class Outcome(NamedTuple):
+    """One scenario, played without the shield, with it, and by the letter of Def. 10 where that is another thing."""
+
+    scenario: Scenario
+    off: Result
+    on: Result
+    literal: Result | None
+    differences: tuple[str, ...]  # from what is derived; none is as it should be
+
+
+def outcome_of(scenario: Scenario) -> Outcome:
+    """Play a scenario and compare it with what its author has worked out."""
+    off, on = play(scenario, False), play(scenario, True)
+    literal = play(scenario, True, LITERAL) if scenario.literal is not None else None
+    wrong = []
+    for name, found, expected in (
+        ("verdict without the shield", off.verdict, scenario.off),
+        ("verdict with the shield", on.verdict, scenario.on),
+        ("verdict by the letter", literal.verdict if literal else None, scenario.literal),
+        ("axis", off.axis, scenario.axis),
+        ("response", off.response, scenario.response),
+        ("duties broken with the shield", on.broken, 0),
+    ):
+        if found != expected:
+            wrong.append(f"{name}: {found!r}, derived {expected!r}")
+    if not _is_near(off.danger, scenario.danger):
+        wrong.append(f"danger: {off.danger} s, derived {scenario.danger} s")
+    return Outcome(scenario, off, on, literal, tuple(wrong))
+
+
+def _is_near(found: float | None, derived: float | None) -> bool:
+    if found is None or derived is None:
+        return found is derived
+    return derived - EARLIER < found <= derived + LATER
+
+
+def page_of(outcomes: list[Outcome]) -> str:
+    """The page of results."""
+    as_derived = sum(not one.differences for one in outcomes)
+    contacts = [one for one in outcomes if one.off.verdict]
+    left = [one for one in outcomes if one.on.verdict]
+    at_fault = sum(one.on.verdict in AT_FAULT for one in outcomes)
+    lines = [
+        "# Scenarios",
+        "",
+        "Written by `rss-shield scenarios --write docs/results`. Scripted situations. What is expected of each is "
+        "worked out by hand in `eval/suite/scenarios/catalogue.py`, arithmetic included, and compared here with "
+        "what comes out.",
+        "",
+        f"{as_derived} of {len(outcomes)} come out as derived. Without the shield {len(contacts)} end in a contact, "
+        f"with it {len(left)}, of which {at_fault} are the ego's fault. Nothing is drawn at random, so there is no "
+        "interval: every scenario is played once and is the same each time.",
+        "",
+        "*Danger*: as derived, then as seen on frames of 0.1 s; up to 0.3 s earlier is as derived, for what "
+        "sampling and boxes that may turn cost. *Def. 10*: the verdict with the shield by the letter of Def. 10, "
+        "without the duty to brake for whoever has cut in (hole H6), where that is played. Verdicts are from the "
+        "ego's view, by the full table in every column.",
+        "",
+        "| situation | kind | danger [s] | axis | response | off | on | Def. 10 | speed taken off [m/s] |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for one in outcomes:
+        s = one.scenario
+        danger = (
+            "none"
+            if s.danger is None
+            else f"{s.danger:.2f}, {one.off.danger:.1f}"
+            if one.off.danger is not None
+            else "?"
+        )
+        cells = (
+            s.name + (" **differs**" if one.differences else ""),
+            *(s.kind, danger, one.off.axis or "-", one.off.response or "-"),
+            *(one.off.verdict or "no contact", one.on.verdict or "no contact"),
+            (one.literal.verdict or "no contact") if one.literal else "",
+            f"{max(one.on.speed_lost, 0.0):.1f}",
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    wrong = [f"- {one.scenario.name}: {difference}" for one in outcomes for difference in one.differences]
+    if wrong:
+        lines += ["", "Not as derived:", "", *wrong]
+    lines += ["", "## Derivations", ""]
+    lines += [f"**{one.scenario.name[0].upper()}{one.scenario.name[1:]}.** {one.scenario.why}\n" for one in outcomes]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def run(arguments: list[str] | None = None) -> None:
+    """Play what the command line names."""
+    parser = argparse.ArgumentParser(prog="rss-shield scenarios", description="Scripted situations, derived by hand.")
+    parser.add_argument("names", nargs="*", help="those whose names contain one of these; none = all")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="write scenarios.md there; of all scenarios only")
+    parser.add_argument("--traces", type=Path, metavar="FOLDER", help="write trace and picture of each run there")
+    options = parser.parse_args(arguments)
+    chosen = [s for s in SCENARIOS if not options.names or any(name in s.name for name in options.names)]
+    if not chosen:
+        sys.exit(
+            f"rss-shield scenarios: no name contains {', '.join(options.names)}; there are {len(SCENARIOS)} scenarios"
+        )
+    if options.write is not None and len(chosen) < len(SCENARIOS):
+        sys.exit("rss-shield scenarios: --write is for all scenarios: expected no names beside it")
+    outcomes = []
+    for scenario in chosen:
+        outcome = outcome_of(scenario)
+        outcomes.append(outcome)
+        said = "as derived" if not outcome.differences else "; ".join(outcome.differences)
+        print(f"{scenario.name}: off {outcome.off.verdict or '-'}, on {outcome.on.verdict or '-'}: {said}")
+        if options.traces is not None:
+            _keep(outcome, options.traces)
+    if options.write is not None:
+        write_text(options.write / "scenarios.md", page_of(outcomes))
+    if any(outcome.differences for outcome in outcomes):
+        sys.exit(1)
+
+
+def _keep(outcome: Outcome, folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = "_".join("".join(c if c.isalnum() else " " for c in outcome.scenario.name).split())
+    for mode, result in (("off", outcome.off), ("on", outcome.on), ("literal", outcome.literal)):
+        if result is None:
+            continue
+        save(result.trace, folder / f"{stem}_{mode}.npz")
+        names = [car.name for car in outcome.scenario.cars]
+        pair = (0, names.index(outcome.scenario.partner))
+        draw(judge_trace(result.trace), folder / f"{stem}_{mode}.png", pair)

@@ -1,0 +1,161 @@
+"""CSV files of trajectories, ours and those of public data sets, are the cars that they were written from."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rss_shield.cli import main
+from rss_shield.eval.suite.judge.trajectories import Format, read_csv, read_lanes, straight_lanes
+
+DT, FOOT = 0.1, 0.3048
+TIME = np.arange(41) * DT
+# centres of two cars [m]: one along x at 20 m/s, one that turns to the right (y grows to the right of x) at 10 m/s
+ANGLE = 10.0 * TIME / 50.0
+X = np.stack([20.0 * TIME, 100.0 + 50.0 * np.sin(ANGLE)], axis=1)
+Y = np.stack([0.0 * TIME, 50.0 * (1.0 - np.cos(ANGLE))], axis=1)
+HEADING = np.stack([0.0 * TIME, ANGLE], axis=1)
+SPEED = np.array([20.0, 10.0])
+SIZES = ((5.0, 2.0), (12.0, 2.5))
+
+
+def rows(**columns):
+    """One row per car and time."""
+    frames = []
+    for i in range(2):
+        one = {name: values[:, i] if np.ndim(values) == 2 else values for name, values in columns.items()}
+        frames.append(pd.DataFrame({"id": 7 + i, **one}))
+    return pd.concat(frames, ignore_index=True)
+
+
+def written(table, tmp_path, name="log.csv"):
+    table.sample(frac=1.0, random_state=3).to_csv(tmp_path / name, index=False)  # in no order
+    return tmp_path / name
+
+
+def check(trace, heading_within=0.02, speed_within=0.1):
+    users = trace.users
+    assert users.ids in (("7", "8"), ("8", "7")) and trace.dt == pytest.approx(DT)
+    order = [users.ids.index(name) for name in ("7", "8")]
+    np.testing.assert_allclose(users.x[:, order], X, atol=0.02)
+    np.testing.assert_allclose(users.y[:, order], Y, atol=0.02)
+    np.testing.assert_allclose(users.heading[:, order], HEADING, atol=heading_within)
+    np.testing.assert_allclose(users.speed[:, order], np.broadcast_to(SPEED, X.shape), atol=speed_within)
+
+
+@pytest.mark.parametrize("y", ["up", "down"])
+def test_a_plain_file(tmp_path, y):
+    side = -1.0 if y == "up" else 1.0
+    path = written(rows(t=TIME, x=X, y=side * Y, heading=side * HEADING), tmp_path)
+    check(read_csv(path, Format(y_up=y == "up")), heading_within=1e-9)
+
+
+def test_heading_and_speed_are_derived_where_they_are_missing(tmp_path):
+    check(read_csv(written(rows(t=TIME, x=X, y=Y), tmp_path), Format(y_up=False)))
+
+
+def test_other_names_and_units(tmp_path):
+    table = rows(when=TIME * 1e3, px=X / FOOT, py=Y / FOOT, yaw=np.degrees(HEADING), kmh=np.tile(SPEED * 3.6, (41, 1)))
+    known = Format(
+        "id",
+        "when",
+        "px",
+        "py",
+        "yaw",
+        "kmh",
+        units={"t": "ms", "x": "ft", "y": "ft", "heading": "deg", "speed": "km/h"},
+    )
+    check(read_csv(written(table, tmp_path), known._replace(y_up=False)), 1e-9, 1e-9)
+
+
+def test_highd_has_corners_of_boxes_and_frames_of_25_hertz(tmp_path):
+    """A car of 5 m x 2 m with its centre at (20 t, 10): its box begins 2.5 m before and 1 m above. One comes back."""
+    t = np.arange(51) / 25.0
+    x, y = np.stack([20.0 * t, 200.0 - 30.0 * t], axis=1), np.stack([10.0 + 0.0 * t, 4.0 + 0.0 * t], axis=1)
+    length, width = np.array([5.0, 12.0]), np.array([2.0, 2.5])
+    table = rows(frame=np.arange(51) + 1, x=x - length / 2, y=y - width / 2)
+    table["width"], table["height"] = np.repeat(length, 51), np.repeat(width, 51)  # along and across the road
+    trace = read_csv(written(table, tmp_path), "highd")
+    order = [trace.users.ids.index(name) for name in ("7", "8")]
+    assert trace.dt == pytest.approx(0.04)
+    np.testing.assert_allclose(trace.users.x[:, order], x, atol=1e-9)
+    np.testing.assert_allclose(trace.users.y[:, order], y, atol=1e-9)
+    assert trace.users.length[order].tolist() == [5.0, 12.0] and trace.users.width[order].tolist() == [2.0, 2.5]
+    np.testing.assert_allclose(np.cos(trace.users.heading[0, order]), [1.0, -1.0], atol=1e-9)
+    np.testing.assert_allclose(trace.users.speed[10, order], [20.0, 30.0], atol=1e-9)
+
+
+def test_ngsim_has_the_front_bumper_along_and_across_in_feet(tmp_path):
+    """Its x is ours y. The front of a car of 15 ft is 7.5 ft before its centre."""
+    table = rows(Frame_ID=np.arange(41) + 100, Local_Y=(20.0 * TIME + 2.286) / FOOT, Local_X=3.0 / FOOT)
+    table = table.rename(columns={"id": "Vehicle_ID"})
+    table["v_Length"], table["v_Width"], table["v_Vel"], table["v_Class"] = 15.0, 6.0, 20.0 / FOOT, 2
+    trace = read_csv(written(table[table["Vehicle_ID"] == 7], tmp_path), "ngsim")
+    np.testing.assert_allclose(trace.users.x[:, 0], 20.0 * TIME, atol=1e-9)
+    np.testing.assert_allclose(trace.users.y[:, 0], 3.0, atol=1e-9)
+    assert trace.users.length[0] == pytest.approx(4.572) and trace.users.kinds == ("car",)
+    np.testing.assert_allclose(trace.users.speed, 20.0)
+
+
+def test_gaps_stay_gaps_and_other_steps_are_interpolated(tmp_path):
+    table = rows(t=TIME, x=X, y=Y)
+    table = table[~((table["id"] == 8) & table["t"].between(0.95, 2.05))]
+    trace = read_csv(written(table, tmp_path), Format(y_up=False))
+    there = trace.users.present[:, trace.users.ids.index("8")]
+    assert not there[11:20].any() and there[:10].all() and there[21:].all()
+    finer = read_csv(written(rows(t=TIME, x=X, y=Y), tmp_path), Format(y_up=False), dt=0.05)
+    assert finer.dt == 0.05 and len(finer.time) == 81
+    np.testing.assert_allclose(finer.users.x[:, finer.users.ids.index("7")], 20.0 * finer.time, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda rows: rows.drop(columns="x"), "no column 'x' for x: expected one of id, t, y"),
+        (
+            lambda rows: rows.assign(y=["1"] * 40 + ["none"] + ["1"] * 41),
+            "y = 'none' in row .*: expected a finite number",
+        ),
+        (lambda rows: pd.concat([rows, rows.iloc[:1]]), "id = 7 is there twice at t = 0"),
+        (lambda rows: rows.assign(t=np.append(rows["t"].to_numpy()[:-1], 4.04)), "t = 4.04 s is no multiple of 0.1 s"),
+        (lambda rows: rows.assign(t=1.0).drop_duplicates("id"), "all rows have one time"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_named(tmp_path, change, message):
+    with pytest.raises(ValueError, match=message):
+        read_csv(written(change(rows(t=TIME, x=X, y=Y)), tmp_path))
+
+
+def test_formats_and_units_are_known_ones(tmp_path):
+    path = written(rows(t=TIME, x=X, y=Y), tmp_path)
+    with pytest.raises(ValueError, match="format = 'interaction': expected one of plain, highd, ngsim"):
+        read_csv(path, "interaction")
+    with pytest.raises(ValueError, match="unit of x = 'yards': expected one of m, ft"):
+        read_csv(path, Format(units={"x": "yards"}))
+
+
+def test_lanes_come_from_a_file_or_from_offsets(tmp_path):
+    path = tmp_path / "lanes.json"
+    path.write_text('{"lanes": [{"id": 1, "centre": [[0, 0], [100, 0], [150, 50]], "width": 3, "successors": []}]}')
+    (lane,) = read_lanes(path)
+    np.testing.assert_allclose(lane.centre[:, 2], [0.0, np.pi / 8, np.pi / 4])  # halfway at the corner
+    assert lane.id == "1" and lane.width.tolist() == [3.0] * 3
+    left, right = straight_lanes([3.5, 0.0], 3.5, -10.0, 90.0)
+    assert (left.centre[0, 1], right.centre[0, 1], left.right, right.left) == (0.0, 3.5, right.id, left.id)
+    path.write_text('{"lanes": [{"id": 1, "centre": [[0, 0], [1, 0]], "colour": "red"}]}')
+    with pytest.raises(ValueError, match="unknown field 'colour'"):
+        read_lanes(path)
+    path.write_text("none")
+    with pytest.raises(ValueError, match="expected JSON with a list 'lanes'"):
+        read_lanes(path)
+
+
+def test_a_file_is_judged_from_the_command_line(tmp_path, capsys):
+    """20 m/s toward a car that stands 60 m ahead; nobody brakes: 66 m and more would have been needed."""
+    still = np.stack([20.0 * TIME, 65.0 + 0.0 * TIME], axis=1)
+    table = rows(t=TIME, x=still, y=0.0)
+    main(["judge", str(written(table, tmp_path)), "--lanes-at", "0", "--params", "slides"])
+    out = capsys.readouterr().out
+    assert "7 in danger with 8 (inherited, rear)" in out and "contact of 7 and 8" in out and "at fault: 7" in out
+    for option, message in ((["--columns", "z=alt"], "--columns z"), (["--lanes-at", "left"], "expected numbers")):
+        with pytest.raises(SystemExit, match=message):
+            main(["judge", str(tmp_path / "log.csv"), *option])
