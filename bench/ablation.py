@@ -121,9 +121,9 @@ def swept(folder: Path, safety: str, performance: str) -> str:
 
 
 def code_of(folder: Path) -> str:
-    """By which code a sweep was run."""
+    """By which code a sweep was begun."""
     record = json.loads((folder / "experiment.json").read_text(encoding="utf-8"))["versions"]
-    return f"Code {str(record['git_commit'])[:12]}, numpy {record['packages']['numpy']}, {record['cpu']}."
+    return f"Begun with code {str(record['git_commit'])[:12]}, numpy {record['packages']['numpy']}, {record['cpu']}."
 
 
 def main() -> None:

@@ -197,7 +197,8 @@ def sweep(experiment: Experiment, folder: Path, work: Work = do_task, **run: Any
 def _record(experiment: Experiment, folder: Path) -> list[str]:
     """Write the experiment and the versions beside its results; says what changed since the first task."""
     path, now = folder / "experiment.json", json.loads(to_json(versions()))
-    before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"versions": now}
+    begun = path.exists() and any((folder / "tasks").glob("[!.]*"))
+    before = json.loads(path.read_text(encoding="utf-8")) if begun else {"versions": now}
     write_json(path, {"experiment": asdict(experiment), "versions": before["versions"]})
     changed = [name for name in now if now[name] != before["versions"].get(name)]
     return [
