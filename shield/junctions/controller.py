@@ -308,9 +308,10 @@ def _find_followers(scene, memory):
     _find_those_behind(scene, memory)
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
-        known = memory[threat.user]
-        if threat.follows and known.age > 0 and not known.follows:
-            threat.follows = _keeps_distance(scene, threat)
+        if threat.follows:  # a light is nobody, and follows nobody
+            known = memory[threat.user]
+            if known.age > 0 and not known.follows:
+                threat.follows = _keeps_distance(scene, threat)
 
 
 @compiled
