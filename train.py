@@ -46,7 +46,7 @@ from rss_shield.eval.run_folder import changes, open_run, recorded
 from rss_shield.eval.suite import showcase
 from rss_shield.shield.junctions.controller import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
-from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
+from rss_shield.shield.params import PRESETS, Preset, Rules, with_parameters
 
 TEST_ENVS = {"fast": 256, "highway-env": 1}  # side by side in testing; the engine is the faster, the more there are
 PROGRAM = "train.py"
@@ -589,16 +589,10 @@ def preset_name(config: Config) -> str:
 def resolve(config: Config) -> Preset:
     """The preset with the parameters given on the command line put in."""
     preset = PRESETS[preset_name(config)]
-    given = {"ego": _given(config.ego), "other": _given(config.other)}
-    for side, values in given.items():
-        try:
-            params = RSSParams.validated(**{**getattr(preset, side)._asdict(), **values})
-        except ValueError as error:
-            raise ValueError(f"--{side}: {error}") from None
-        preset = preset._replace(**{side: params})  # type: ignore[arg-type]
-    if "response_time" in given["ego"]:  # asked for, so never raised to one frame silently
-        preset = preset._replace(per_frame=False)
-    return preset
+    try:
+        return with_parameters(preset, _given(config.ego), _given(config.other))
+    except ValueError as error:
+        raise ValueError(f"--{error}") from None
 
 
 def options_of(config: Config) -> dict[str, Any]:

@@ -6,7 +6,7 @@ often than short ones, so rows of the finished ones alone would show too many ea
 
 import csv
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -100,16 +100,23 @@ def episode_row(timesteps: int, n_envs: int, info: dict[str, Any], cut: int = 0)
     }
 
 
-def truncate_curve(path: Path, timesteps: int) -> None:
-    """Keep the rows up to `timesteps`, the last checkpoint: what came later will happen again."""
+def truncate_curve(path: Path, timesteps: int, columns: Sequence[str] = COLUMNS) -> None:
+    """Keep the rows up to `timesteps`, the last checkpoint: what came later will happen again.
+
+    Args:
+      path: CSV file; one with a header only is made where there is none.
+      timesteps: decisions.
+      columns: of the file, "timesteps" among them.
+    """
     rows = []
     if path.exists():
         with open(path, newline="", encoding="utf-8") as file:
             # rows past the checkpoint go, and so does a last row that a kill cut short
-            rows = [row for row in csv.DictReader(file) if row["cost"] and int(row["timesteps"]) <= timesteps]
+            whole = (row for row in csv.DictReader(file) if row[columns[-1]])
+            rows = [row for row in whole if int(row["timesteps"]) <= timesteps]
     temporary = path.with_name(path.name + ".tmp")
     with open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
+        writer = csv.DictWriter(file, columns)
         writer.writeheader()
         writer.writerows(rows)
     os.replace(temporary, path)

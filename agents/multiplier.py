@@ -6,7 +6,6 @@ reinforcement learning by PID Lagrangian methods", ICML 2020), once per rollout.
 
 import csv
 import math
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -14,6 +13,7 @@ from typing import TextIO
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
+from rss_shield.agents.curve import truncate_curve
 from rss_shield.agents.vec_env import VectorEnvAdapter
 
 COLUMNS = (
@@ -103,7 +103,7 @@ class MultiplierRecorder(BaseCallback):
     def _on_training_start(self) -> None:
         folder = Path(self.model.logger.dir or ".").parent
         path = folder / "multiplier.csv"
-        _cut(path, self.num_timesteps)
+        truncate_curve(path, self.num_timesteps, COLUMNS)
         self.file = path.open("a", newline="", encoding="utf-8")
         self._meter.clear()
         self._meter.multiplier = self.model.pid.multiplier  # type: ignore[attr-defined]
@@ -125,17 +125,3 @@ class MultiplierRecorder(BaseCallback):
 
     def _on_training_end(self) -> None:
         self.file.close()
-
-
-def _cut(path: Path, timesteps: int) -> None:
-    """Keep the rows up to `timesteps`, the last checkpoint; what came later will happen again."""
-    rows = []
-    if path.exists():
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.DictReader(file) if row["multiplier"] and int(row["timesteps"]) <= timesteps]
-    temporary = path.with_name(path.name + ".tmp")
-    with open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(rows)
-    os.replace(temporary, path)

@@ -5,6 +5,7 @@ Cars" (arXiv:1708.06374). Braking parameters are positive magnitudes.
 """
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 
@@ -230,6 +231,27 @@ PRESETS: dict[str, Preset] = {
     ),
     **{name: _simulator_on(name) for name in ROADS},
 }
+
+
+def with_parameters(preset: Preset, ego: Mapping[str, float], other: Mapping[str, float]) -> Preset:
+    """A preset with some of its parameters replaced.
+
+    Args:
+      preset: `Preset`.
+      ego, other: name -> value, of the ego and of everybody else.
+
+    Raises:
+      ValueError: an unknown name, or a value out of range; the message begins with "ego" or "other".
+    """
+    for side, values in (("ego", ego), ("other", other)):
+        try:
+            params = RSSParams.validated(**{**getattr(preset, side)._asdict(), **values})
+        except ValueError as error:
+            raise ValueError(f"{side}: {error}") from None
+        preset = preset._replace(**{side: params})  # type: ignore[arg-type]
+    if "response_time" in ego:  # asked for, so never raised to one frame silently
+        preset = preset._replace(per_frame=False)
+    return preset
 
 
 class Rules(NamedTuple):

@@ -10,7 +10,7 @@ from rss_shield.envs.highway.hostile import HOSTILE
 from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import MODES, Options
 from rss_shield.eval.runs.names import check_names, nested
-from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules
+from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules, with_parameters
 
 OTHERS = {"reckless": RECKLESS, **HOSTILE}  # who else is on the road, by name
 _SHIELD = (
@@ -82,11 +82,7 @@ def _table(environment: str, given: Mapping[str, Any], prefix: str) -> Preset | 
     preset = PRESETS[name]
     for side, values in asked.items():
         check_names(values, RSSParams._fields, f"{prefix}{side}")
-        try:
-            params = RSSParams.validated(**{**getattr(preset, side)._asdict(), **values})
-        except ValueError as error:
-            raise ValueError(f"{prefix}{side}: {error}") from None
-        preset = preset._replace(**{side: params})  # type: ignore[arg-type]
-    if "response_time" in asked["ego"]:  # asked for, so never raised to one frame silently
-        preset = preset._replace(per_frame=False)
-    return preset
+    try:
+        return with_parameters(preset, asked["ego"], asked["other"])
+    except ValueError as error:
+        raise ValueError(f"{prefix}{error}") from None
