@@ -101,7 +101,7 @@ class MultiplierRecorder(BaseCallback):
         self.file: TextIO
 
     def _on_training_start(self) -> None:
-        folder = Path(self.model.logger.dir or ".").parent
+        folder = Path(self.model.logger.dir or ".")  # of the model, see `agents.trackers.logger_of`
         path = folder / "multiplier.csv"
         truncate_curve(path, self.num_timesteps, COLUMNS)
         self.file = path.open("a", newline="", encoding="utf-8")
