@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 from places import ROOT
@@ -56,7 +57,11 @@ def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
     wheels, source = tmp_path_factory.mktemp("wheels"), tmp_path_factory.mktemp("copy") / "source"
-    left_out = shutil.ignore_patterns(".*", "__pycache__", "build", "*.egg-info", "runs", "tests")
+    everywhere = shutil.ignore_patterns(".*", "__pycache__", "build", "*.egg-info")
+
+    def left_out(folder, names):
+        return {*everywhere(folder, names), *({"runs", "tests"} if Path(folder) == ROOT else ())}
+
     shutil.copytree(ROOT, source, symlinks=True, ignore=left_out)  # what is built would stay in the checkout
     subprocess.run([*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", wheels, source], check=True)
     (wheel,) = wheels.glob("rss_shield-*.whl")

@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 from places import ROOT
 
-from rss_shield.eval.metrics import METRICS
+from rss_shield.eval.metrics import METRICS, with_outcomes
 from rss_shield.shield.params import RSSParams
 
 SCRIPT = ROOT / "train.py"
@@ -217,6 +217,7 @@ def test_a_run_writes_everything_a_paper_needs(finished):
         "blame.pdf",
         "removal.png",
         "removal.pdf",
+        "pages",
         "unshielded-seed0",
         "shielded-seed0",
     }
@@ -246,7 +247,9 @@ def test_every_cell_of_a_run_plays_the_same_seeds(finished):
     assert list(seeds.values()) == [[10**9, 10**9 + 1, 10**9 + 2]] * 4
     assert (episodes.loc[episodes["test"] == "off", "override_share"] == 0).all()
     cells = json.loads((folder / "results.json").read_text())["cells"]
-    assert len(cells) == 4 * (len(METRICS) - 2)  # here nothing can succeed, sooner or later
+    # here nothing can succeed, sooner or later, and nobody asked for risk and measures
+    assert {cell["metric"] for cell in cells} == {m.name for m in METRICS} & set(with_outcomes(episodes).columns)
+    assert len(cells) == 4 * len({cell["metric"] for cell in cells}) > 4 * 15
     assert all(cell["n"] == 3 for cell in cells)
 
 

@@ -28,7 +28,7 @@ def _look(cars, episode, net, sight, frames, past, boxes, settings, chosen, limi
     """One frame, in which `limit` decides who is measured; returns what is found and how many were measured."""
     survey(cars, episode, net, sight, None)
     distances = Distances(frames, past)
-    measure(cars, episode, net.lanes, sight, distances, boxes, settings, chosen, limit, soonest)
+    measure(cars, episode, net.lanes, sight, distances, boxes, settings, chosen, limit, soonest, -np.inf)
     danger = find_danger(
         past.ego[episode.turn],
         sight.users,
