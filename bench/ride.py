@@ -93,7 +93,7 @@ def play(env_id: str, driver: str, mode: str, rules: Rules, episodes: int, threa
     try:
         make_vec(env_id, 1, mode, **options).close()
     except Unsupported:
-        few = range(FIRST_SEED, FIRST_SEED + min(episodes, 60))
+        few = range(FIRST_SEED, FIRST_SEED + min(episodes, 20))
         rows = [
             run_episode(lambda: make(env_id, mode, **options), lambda _: act(driver, rng, 1, actions)[0], s)
             for s in few
