@@ -255,7 +255,10 @@ def frames_free(seed: int, actions: np.ndarray, rules: Rules) -> tuple[int, int]
 
 def between_lanes(config: Config) -> str:
     rows: list[Any] = [
-        ("actions", "shield", "n", "longest [s]", f"above {LONG} s", "most of it that is no lane change at the limits [s]", "mean [s]")
+        (
+            *("actions", "shield", "n", "longest [s]", f"above {LONG} s"),
+            *("most of it that is no lane change at the limits [s]", "mean [s]"),
+        )
     ]
     n, dt = config.lane_changes, 0.2
     for driver in ("lanes", "random"):
@@ -285,8 +288,8 @@ def between_lanes(config: Config) -> str:
     text = f"""Longest stretch more than 1 m off the centre of every lane, highway-fast-v0 (frames of {dt} s). A lane
 change crosses 2 m there, and the published limits of lateral speed and heading (C1y, `heading_bound`) let a car at
 15 m/s do so in 1.3 s at best. Episodes above {LONG} s are therefore played again on highway-env, and in their longest
-stretches those frames are counted on which the shield did *not* hold the steering to such a limit, or the car did not get
-on toward the side on which it left: what is not a lane change at the limits."""
+stretches those frames are counted on which the shield did *not* hold the steering to such a limit, or the car did not
+get on toward the side on which it left: what is not a lane change at the limits."""
     return f"## Between two lanes\n\n{text}\n\n{markdown(rows)}"
 
 

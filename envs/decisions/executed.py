@@ -27,6 +27,8 @@ def executed_actions(kind: Any, handed: np.ndarray, refused: np.ndarray, command
       `[E, ...]` actions; as handed where there was no frame.
     """
     if isinstance(kind, DiscreteMetaAction):
+        if not refused.any():
+            return handed
         idle = kind.actions_indexes["IDLE"]
         changes = np.isin(handed, [a for a, name in kind.actions.items() if name in _CHANGES])
         return np.where(refused & changes, idle, handed)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+from highway_env.envs.common.action import DiscreteMetaAction
 
 from rss_shield.envs.arguments import seed_of, whole
 from rss_shield.envs.decisions.executed import executed_actions
@@ -191,10 +192,11 @@ class FastVectorEnv(VectorEnv):
         return infos
 
     def _executed(self, steps, actions) -> np.ndarray:
-        commands = np.full((len(steps), 2), np.nan)
-        np.divide(steps["acceleration"], steps["frames"], out=commands[:, 0], where=steps["frames"] > 0)
-        np.divide(steps["steering"], steps["frames"], out=commands[:, 1], where=steps["frames"] > 0)
-        return executed_actions(self.scenario.stock.action_type, actions, steps["lane_change_refused"], commands)
+        kind, commands = self.scenario.stock.action_type, np.full((len(steps), 2), np.nan)
+        if not isinstance(kind, DiscreteMetaAction):  # of which nobody asks for commands
+            np.divide(steps["acceleration"], steps["frames"], out=commands[:, 0], where=steps["frames"] > 0)
+            np.divide(steps["steering"], steps["frames"], out=commands[:, 1], where=steps["frames"] > 0)
+        return executed_actions(kind, actions, steps["lane_change_refused"], commands)
 
     def _episode(self, steps: np.ndarray) -> dict:
         lasted = np.round(perf_counter() - self._began, 6)
