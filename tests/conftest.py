@@ -39,6 +39,7 @@ SLOW = frozenset(
         "envs/test_taken_back",
         "envs/test_wrapper",
         "eval/test_backends",
+        "eval/test_judge_risk",
         "eval/test_learning_curve",
         "eval/test_offline_judge",
         "eval/test_paper",

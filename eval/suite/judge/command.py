@@ -10,6 +10,7 @@ import numpy as np
 from rss_shield.eval.files import atomic, write_json
 from rss_shield.eval.suite.judge.findings import json_of, pair_frames, text_of
 from rss_shield.eval.suite.judge.judgement import judge_trace
+from rss_shield.eval.suite.judge.risk import risk_lines, risk_table
 from rss_shield.eval.suite.judge.trajectories import FORMATS, Format, read_csv, read_lanes, straight_lanes
 from rss_shield.shield.params import PRESETS, Preset
 from rss_shield.shield.trace import Lane, Trace, load
@@ -36,6 +37,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--response-time", type=float, help="of everybody, instead of the preset's [s]")
     parser.add_argument("--ego", action="append", default=[], metavar="ID", help="judge from this user's view only")
     parser.add_argument("--out", type=Path, help="folder for NAME.json, NAME.csv (pair-frames) and NAME.png")
+    parser.add_argument("--risk", action="store_true", help="the driving safety field, too, beside TTC, THW and DRAC")
     parser.add_argument("--all-frames", action="store_true", help="safe pair-frames in the CSV, too")
     csv = parser.add_argument_group("trajectories in CSV files")
     csv.add_argument("--format", default="plain", help=f"columns: {', '.join(FORMATS)}")
@@ -58,6 +60,9 @@ def _judge(path: Path, options: argparse.Namespace) -> None:
     users = [trace.users.ids.index(name) for name in options.ego] or None
     judgement = judge_trace(trace, _table(trace, options), users=users)
     print(text_of(judgement, path.name))
+    risk = risk_table(trace, users or range(len(trace.users.ids))) if options.risk else None
+    if risk is not None:
+        print("\n".join(risk_lines(risk)))
     if options.out is not None:
         from rss_shield.eval.suite.judge.pictures import draw
 
@@ -66,6 +71,9 @@ def _judge(path: Path, options: argparse.Namespace) -> None:
         with atomic(options.out / f"{path.stem}.csv") as temporary:
             pair_frames(judgement, not options.all_frames).to_csv(temporary, index=False)
         draw(judgement, options.out / f"{path.stem}.png")
+        if risk is not None:
+            with atomic(options.out / f"{path.stem}-risk.csv") as temporary:
+                risk.to_csv(temporary, index=False)
         print(f"written to {options.out}: {path.stem}.json, {path.stem}.csv, {path.stem}.png")
 
 
