@@ -38,6 +38,17 @@ BINS = 10  # points of a learning curve, at most
 UNFINISHED = 0.05  # a point is drawn where at most this share of the episodes has an unknown end
 
 
+def label_over_training(axes: Axes, name: str, share: bool) -> None:
+    """Title and scales of a panel over training timesteps; a share is drawn from 0 to 100 %."""
+    axes.set_title(name, loc="left")
+    if share:
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        axes.set_ylim(-0.03, 1.03)
+    place = axes.get_subplotspec()
+    if place is not None and place.is_last_row():
+        axes.set_xlabel("Training timesteps [decisions]")
+
+
 def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
     """Return, crashes, blame and overrides against timesteps, one line per arm with its 95 % band.
 
@@ -68,12 +79,7 @@ def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
                     for low, high, inside in bins[arm]
                 ]
                 _line(axes, points, label, str(arm))
-            axes.set_title(name, loc="left")
-            if name != "Return per episode":
-                axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-                axes.set_ylim(-0.03, 1.03)
-            if axes.get_subplotspec().is_last_row():
-                axes.set_xlabel("Training timesteps [decisions]")
+            label_over_training(axes, name, share=name != "Return per episode")
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
         explained = (

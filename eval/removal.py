@@ -11,12 +11,11 @@ import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
 from scipy import stats
 
 from rss_shield.eval.files import write_text
 from rss_shield.eval.metrics import with_outcomes
-from rss_shield.eval.plots import STYLE, save, seeds_text, style_of
+from rss_shield.eval.plots import STYLE, label_over_training, save, seeds_text, style_of
 from rss_shield.eval.stats import Interval, wilson
 
 FILE = "removal_curve.csv"
@@ -99,12 +98,7 @@ def plot_removal(rows: pd.DataFrame, folder: Path, title: str) -> None:
                 axes.plot(x, [p.value for _, p in points], label=f"{arm} ({seeds_text(seeds)})", markersize=3, **look)
                 low, high = [p.low for _, p in points], [p.high for _, p in points]
                 axes.fill_between(x, low, high, color=look["color"], alpha=0.15, linewidth=0)
-            axes.set_title(name, loc="left")
-            if value in ("crash", "at_fault"):
-                axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-                axes.set_ylim(-0.03, 1.03)
-            if axes.get_subplotspec().is_last_row():
-                axes.set_xlabel("Training timesteps [decisions]")
+            label_over_training(axes, name, share=value in ("crash", "at_fault"))
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
         n = int(rows["n"].max())
