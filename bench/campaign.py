@@ -2,6 +2,8 @@
 
     python bench/campaign.py                 begin, or go on: what is finished is not repeated (hours to days)
     python bench/campaign.py --list          what it consists of, and what is done
+    python bench/campaign.py --plan short    the most telling arms with fewer seeds and decisions (two hours on 2 cores)
+    python bench/campaign.py --write         docs/results/agents.md from what is done; with --list nothing is trained
     python bench/campaign.py --divide 1000 -- --n-envs 2 --replay-episodes 0     try the whole chain
     python bench/campaign.py -- --workers 1  further options of train.py
 
@@ -17,10 +19,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rss_shield.eval.arms import ARMS
+from rss_shield.eval.paper.agents import write
 
 ROOT = Path(__file__).parents[1]
 HIGHWAY, INTERSECTION = "highway-fast-v0", "intersection-v0"
-MAIN = ("unshielded", "shielded", "change-penalty-0.02", "adaptive-penalty", "maskable", "ppo-lagrangian")
+MAIN = ("unshielded", "shielded", "change-penalty-0.05", "adaptive-penalty", "maskable", "ppo-lagrangian")
 SCRIPTED = tuple(arm.name for arm in ARMS.values() if arm.scripted)
 PENALTIES = tuple(name for name in ARMS if "penalty-0" in name or name == "penalty-1")
 VARIANTS = ("reward-shaping", "adaptive-share", "proactive", "executed-action", "sailr")
@@ -52,6 +55,16 @@ PARTS = (
     Part("intersection-others", INTERSECTION, OTHERS, 500_000, 5),
     Part("intersection-off-policy", INTERSECTION, Q_LEARNERS, 200_000, 5),
 )
+TELLING = ("change-penalty-0.02", "change-penalty-0.1", "penalty-0.5", "reward-shaping", "sailr", "proactive")
+SHORT = (
+    Part("short-highway-main", HIGHWAY, MAIN, 200_000, 5),
+    Part("short-highway-scripted", HIGHWAY, SCRIPTED, 1, 1),
+    Part("short-intersection-main", INTERSECTION, MAIN, 100_000, 3),
+    Part("short-intersection-scripted", INTERSECTION, SCRIPTED, 1, 1),
+    Part("short-highway-others", HIGHWAY, (*TELLING, "distance-45m", "literal-def10"), 200_000, 3),
+    Part("short-highway-off-policy", HIGHWAY, (*Q_LEARNERS, *CONTINUOUS), 50_000, 3),
+)
+PLANS = {"full": PARTS, "short": SHORT}
 
 
 def folder_of(part: Part, runs: Path) -> Path:
@@ -94,20 +107,35 @@ def call(arguments: list[str]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--list", action="store_true", help="show the parts and what is done, and stop")
-    parser.add_argument("--parts", nargs="+", choices=[part.name for part in PARTS], help="only these")
+    parser.add_argument("--plan", choices=list(PLANS), default="full", help="how much of it (default: %(default)s)")
+    parser.add_argument("--parts", nargs="+", help="only these of the plan")
+    parser.add_argument(
+        "--write", action="store_true", help="write docs/results/agents.md from the parts that are done"
+    )
     parser.add_argument("--runs-dir", type=Path, default=Path("runs"), help="folder of all runs (default: %(default)s)")
     parser.add_argument("--divide", type=int, default=1, help="decisions and episodes by this number, and one seed")
     parser.add_argument("more", nargs="*", metavar="-- OPTION", help="further options of train.py")
     arguments = parser.parse_args()
     if arguments.divide < 1:
         parser.error(f"--divide {arguments.divide}: expected at least 1")
-    runs = arguments.runs_dir
-    chosen = [part for part in PARTS if arguments.parts is None or part.name in arguments.parts]
+    runs: Path = arguments.runs_dir
+    plan = {part.name: part for part in PLANS[arguments.plan]}
+    unknown = [name for name in arguments.parts or () if name not in plan]
+    if unknown:
+        parser.error(f"--parts {' '.join(unknown)}: expected some of {', '.join(plan)}")
+    chosen = [part for part in plan.values() if arguments.parts is None or part.name in arguments.parts]
     if arguments.list:
         for part in chosen:
             done = "done" if is_done(part, runs) else "to do"
             print(f"{part.name}: {done}; {part.decisions} decisions, {part.seeds} seeds, {', '.join(part.arms)}")
-        return
+    else:
+        play(chosen, runs, arguments)
+    if arguments.write:
+        print(f"written: {write([folder_of(part, runs) for part in chosen], ROOT / 'docs' / 'results')}")
+
+
+def play(chosen: list[Part], runs: Path, arguments: argparse.Namespace) -> None:
+    """Begin some parts, or go on with them."""
     for part in chosen:
         if not is_done(part, runs):
             train(part, runs, arguments.divide, arguments.more)

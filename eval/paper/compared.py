@@ -30,7 +30,7 @@ def comparisons(episodes: pd.DataFrame) -> pd.DataFrame:
         pairs = cell.merge(first, on=KEYS, suffixes=("", "_first"))
         for metric in COMPARED:
             here, there = pairs[metric].astype(float), pairs[f"{metric}_first"].astype(float)
-            row = {"train": train, "test": test, "metric": metric, **_difference(pairs, here, there, rng)._asdict()}
+            row = {"train": train, "test": test, "metric": metric, **difference(pairs, here, there, rng)._asdict()}
             if metric != "return":
                 discordant = mcnemar(here, there)
                 row |= {"only_here": discordant.only_first, "only_first": discordant.only_second, "p": discordant.p}
@@ -42,7 +42,13 @@ def comparisons(episodes: pd.DataFrame) -> pd.DataFrame:
     return frame.assign(p_holm=corrected)
 
 
-def _difference(pairs: pd.DataFrame, here: pd.Series, there: pd.Series, rng: np.random.Generator) -> Interval:
+def difference(pairs: pd.DataFrame, here: pd.Series, there: pd.Series, rng: np.random.Generator) -> Interval:
+    """Mean of here - there, over seeds and episodes from two training seeds on, else over episodes.
+
+    Args:
+      pairs: a row per pair of episodes; column train_seed.
+      here, there: of the same rows.
+    """
     seeds = [group.index for _, group in pairs.groupby("train_seed")]
     if len(seeds) < 2:
         return paired_difference(here, there, rng)

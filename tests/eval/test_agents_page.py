@@ -1,0 +1,118 @@
+"""The page of arms: its numbers are those of the episodes, and its sentences follow from them."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from result_tables import episodes_of
+
+from rss_shield.eval.paper import agents
+
+EPISODES = 20
+
+
+def leave_run(folder, arms, seeds, cells):
+    """A finished run, as far as the page reads it.
+
+    Args:
+      cells: (train, test) -> blames and mean return of its episodes.
+    """
+    folder.mkdir(parents=True)
+    config = {"env_id": "highway-fast-v0", "arms": arms, "seeds": seeds, "total_timesteps": 1000}
+    config |= {"parameters": {}, "intervention_penalty": 0.0}
+    (folder / "config.json").write_text(json.dumps({"config": config}))
+    (folder / "results.json").write_text("{}")
+    frames = []
+    for seed in seeds:
+        for (train, test), (blames, mean) in cells.items():
+            frame = episodes_of(blames, train, test).assign(train_seed=seed, seed=np.arange(len(blames)))
+            frames.append(
+                frame.assign(**{"override_share": 0.05, "return": mean + 0.1 * seed + 0.01 * np.arange(len(blames))})
+            )
+    pd.concat(frames).to_csv(folder / "episodes.csv", index=False)
+    return folder
+
+
+@pytest.fixture
+def runs(tmp_path):
+    clean, crashing = [""] * EPISODES, ["ego"] * 5 + [""] * 15
+    learnt = leave_run(
+        tmp_path / "main",
+        ["unshielded", "shielded"],
+        [0, 1, 2],
+        {
+            ("off", "off"): (crashing, 18.0),
+            ("off", "on"): (clean, 19.0),
+            ("on", "off"): (crashing, 5.0),
+            ("on", "on"): (clean, 22.0),
+        },
+    )
+    for arm, late in (("unshielded", 20.0), ("shielded", 30.0)):
+        folder = learnt / f"{arm}-seed0"
+        folder.mkdir()
+        started = np.arange(0, 1000, 20)
+        curve = {"timesteps": started + 20, "started": started, "cut": 0, "length": 20, "override_share": 0.1}
+        curve |= {"return": np.where(started < 800, 20.0, late), "crashed": 0, "blame": "no contact", "cost": 0.0}
+        rows = pd.DataFrame(curve)
+        rows.loc[:9, ["crashed", "blame"]] = 1, "ego"  # 10 of 50 episodes, 1000 decisions
+        rows.to_csv(folder / "learning_curve.csv", index=False)
+    scripted = leave_run(
+        tmp_path / "scripted", ["lazy"], [0], {("lazy", "off"): (crashing, 6.0), ("lazy", "on"): (clean, 20.0)}
+    )
+    return [learnt, scripted, tmp_path / "not-begun"]
+
+
+def test_who_beats_the_driver_that_learns_nothing_is_said_first(runs):
+    (road,) = agents.roads_in(runs)
+    text = agents.first_sentences(road, agents.cells_of(road))
+    # 22.1 on average over seeds, 20 of lazy: 22.0, 22.1 and 22.2 less 20
+    assert "`lazy` (always FASTER, return 20.1): `shielded` by +2.10 [" in text
+    assert text.endswith("Worse than it: `unshielded`.")
+
+
+def test_nobody_who_beats_it_is_said_as_plainly(runs):
+    (road,) = agents.roads_in(runs[1:])
+    assert agents.first_sentences(road, agents.cells_of(road)).startswith("**Behind the shield no trained agent beats")
+
+
+def test_an_arms_line_has_its_rates_and_its_training(runs):
+    (road,) = agents.roads_in(runs)
+    line = dict(
+        zip(agents.TABLE_HEADING, agents.row_of(agents.ARMS["shielded"], road, agents.cells_of(road)), strict=True)
+    )
+    assert line["seeds"] == "3"
+    assert line["without: crashes [%]"].startswith("25.0 [")
+    assert line["with: ego at fault [%]"] == "0.0 [0.0, 6.0]"  # 0 of 60: 1 - 0.025^(1/60)
+    assert line["crashes per 1000 decisions of training"] == "10.0"
+    assert line["flat"] == "no (+50 %)"
+    flat = agents.row_of(agents.ARMS["unshielded"], road, agents.cells_of(road))
+    assert flat[-1] == "yes (+0 %)"
+
+
+def test_arms_that_agree_over_seeds_are_not_known_better_than_their_episodes_tell(runs):
+    (road,) = agents.roads_in(runs)
+    crash = agents.estimate(agents.cells_of(road)["unshielded", "off"], "crash")
+    assert crash.value == 0.25 and crash.low <= 0.147 and crash.high >= 0.379  # Clopper-Pearson of 15 of 60
+
+
+def test_thresholds_name_the_arms_that_pass(runs):
+    (road,) = agents.roads_in(runs)
+    asleep, harmless = agents.questions(road, agents.cells_of(road)).splitlines()[:2]
+    assert "`shielded`" in asleep and "`unshielded`" not in asleep  # 19.1 is more than 2 % below 22.1
+    assert harmless.endswith("nobody.")
+
+
+def test_the_page_and_its_figures_are_written(runs, tmp_path):
+    page = agents.write(runs, tmp_path / "results")
+    text = page.read_text()
+    assert "agents-highway-fast-v0-frontier.png" in text and "| `shielded` | 3 |" in text
+    assert sorted(path.name for path in (tmp_path / "results").iterdir()) == [
+        "agents-highway-fast-v0-frontier.png",
+        "agents.md",
+    ]
+
+
+def test_without_a_finished_run_there_is_no_page(tmp_path):
+    with pytest.raises(ValueError, match="expected at least one finished run"):
+        agents.write([tmp_path], tmp_path)
