@@ -11,12 +11,13 @@ from rss_shield.shield.junctions.conflict_areas import cell_of, in_conflict
 from rss_shield.shield.junctions.controller import CAUTIOUS, CROSSING, PLAN, SAMPLE, judge_crossing, junction_frame
 from rss_shield.shield.junctions.examined import TABLE as TABLE_ONLY
 from rss_shield.shield.junctions.plans import THREAT, Scene, Track
-from rss_shield.shield.params import PRESETS
+from rss_shield.shield.params import DEFAULT_RULES, PRESETS, Table
 from rss_shield.shield.verdicts import VERDICTS
 
 DT = 1 / 15
 TABLE = PRESETS["intersection"]
 EGO = TABLE.ego._replace(response_time=2 / 15)
+RULED = Table(EGO, TABLE.other, DEFAULT_RULES, DT)
 
 
 @cache
@@ -63,7 +64,7 @@ class Duel:
 
     def scene(self) -> Scene:
         track = Track(self.path, self.s, self.v, 2.5, -1, 0.0)
-        return Scene(self.roads.paths, track, self.threats, EGO, self.assumed, DT)
+        return Scene(self.roads.paths, track, self.threats, RULED._replace(other=self.assumed))
 
     def frame(self, nominal: float, a_other: float, overrides: bool = True) -> None:
         """One frame; the other car's acceleration is cut to what it can do."""

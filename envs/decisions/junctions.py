@@ -27,19 +27,19 @@ def first_override(scene, samples, memory, plan, speed, frames, entry, at_line, 
       frames: of a decision.
       entry, at_line, which: as in `shield.junctions.controller.junction_frame`.
     """
-    track, dt = scene.track, scene.dt
+    track, dt = scene.track, scene.table.dt
     wish = KP_ACCELERATION * (speed - track.v)
     if junction_frame(scene, samples, memory, plan, wish, entry, at_line, which, True, 0.0).overridden:
         return 0
     for frame in range(frames):
-        here = Scene(scene.paths, track, scene.threats, scene.ego, scene.other, dt, scene.drift)
+        here = Scene(scene.paths, track, scene.threats, scene.table, scene.drift)
         wish = KP_ACCELERATION * (speed - track.v)
         looks = frame > 0 and (frame % _STRIDE == 0 or frame == frames - 1)
         if looks and not leaves_plan(here, samples, memory, wish, entry, at_line, which):
             return frame
         for k in range(len(scene.threats)):
             _go_on(scene.threats[k], dt)
-        track = _driven(track, limit(wish, track.v, scene.ego, dt), dt)
+        track = _driven(track, limit(wish, track.v, scene.table.ego, dt), dt)
     return frames
 
 

@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rss_shield.envs._numpy.floats import norm
-from rss_shield.envs._numpy.ufuncs import arctan, tan
 from rss_shield.envs.fast.collisions import is_near, overlap
 from rss_shield.envs.fast.neighbours import Distances, Past, car_of, measure, row_before, start_past
 from rss_shield.envs.fast.risk import look_at_risk
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network
-from rss_shield.envs.roads.steering import MAX_SLIP
+from rss_shield.envs.roads.steering import MAX_SLIP, slip_at, steering_for
 from rss_shield.envs.roads.ways import (
     Junction,
     Roads,
@@ -208,7 +207,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     episode.room_left, episode.room_right = danger.room_left, danger.room_right
     slip = 0.0  # which nobody asks about where nothing is to be changed or judged
     if steering != 0.0 and (settings.overrides or danger.dangerous):
-        slip = arctan(0.5 * tan(steering))
+        slip = slip_at(steering)
     wish = Command(acceleration, slip)
     response = Response(wish, False, False, False)
     if settings.overrides:
@@ -222,7 +221,7 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
                 response = in_full(response, danger, ego, body, settings.table.rules, settings.table.dt)
         command, steered = response.command, steering
         if command.slip != wish.slip:
-            steered = arctan(2.0 * tan(command.slip))
+            steered = steering_for(command.slip)
         car.acceleration, car.steering = command.acceleration, steered
         count_change(step, episode, abs(command.acceleration - acceleration), abs(steered - steering))
     note_executed(step, car.acceleration, car.steering)
@@ -427,9 +426,7 @@ def scene_of(cars, episode, sight, plans, settings, judging):
         episode.overflow = True
     count = min(count, len(sight.threats))
     drift = drift_of(roads, sight.on_road[n], track)
-    return Scene(
-        roads.paths, track, sight.threats[:count], settings.table.ego, settings.table.other, settings.table.dt, drift
-    )
+    return Scene(roads.paths, track, sight.threats[:count], settings.table, drift)
 
 
 @inner

@@ -81,12 +81,9 @@ class TurnTaker(JunctionEgo):
         return self._is_behind(paths, track, its_track)
 
     def _is_behind(self, paths, track: Track, front: Track) -> bool:
-        settings = self.settings
-        return bool(
-            is_follower(
-                Scene(paths, front, self.room, settings.table.other, settings.table.ego, settings.table.dt), track, True
-            )
-        )
+        table = self.settings.table
+        turned = table._replace(ego=table.other, other=table.ego)
+        return bool(is_follower(Scene(paths, front, self.room, turned), track, True))
 
     def progress(self) -> float:
         """How far it has come on its path [m]."""

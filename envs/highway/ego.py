@@ -9,6 +9,7 @@ from highway_env.vehicle.objects import Landmark
 
 from rss_shield.envs.options import LANES, PLANS, Settings
 from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, road_through, tightest
+from rss_shield.envs.roads.slip import slip_of, steering_of
 from rss_shield.envs.roads.steering import MAX_SLIP
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
@@ -182,7 +183,7 @@ class ShieldedEgo:
         steering = float(nominal["steering"])  # single precision where the agent's action is
         self._meet()
         users, ego, bend = self._sense()
-        wish = Command(float(nominal["acceleration"]), float(np.arctan(0.5 * np.tan(steering))))
+        wish = Command(float(nominal["acceleration"]), float(slip_of(steering)))
         danger = find_danger(ego, users, *self.last, self.memory, settings.table)
         self.rooms = danger.room_left, danger.room_right
         response = Response(wish, False, False, False)
@@ -194,7 +195,7 @@ class ShieldedEgo:
         steered = steering
         if command != wish:
             if command.slip != wish.slip:
-                steered = float(np.arctan(2.0 * np.tan(command.slip)))
+                steered = float(steering_of(command.slip))
             vehicle.action = {"steering": steered, "acceleration": command.acceleration}
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)

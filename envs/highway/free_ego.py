@@ -102,7 +102,7 @@ class FreeEgo(JunctionEgo):
     def _law(self, scene: Scene, acceleration: float) -> float:
         """Steering angle that follows the route [rad]."""
         lanes, way, k = self._way()
-        return float(lane_keeping(lanes[way[k]], self._state(), acceleration, self.dynamical, scene.dt))
+        return float(lane_keeping(lanes[way[k]], self._state(), acceleration, self.dynamical, scene.table.dt))
 
     def _way(self):
         """Lanes of the network, numbers of those on the ego's path, and which of these it follows."""
@@ -160,7 +160,7 @@ def _stays(scene, lanes, way, k, state, dynamical, acceleration, steering, go):
       dynamical: the bicycle is `BicycleVehicle`, not `Vehicle`.
     """
     has_stopped, again = False, 0
-    move(state, acceleration, steering, dynamical, scene.dt)
+    move(state, acceleration, steering, dynamical, scene.table.dt)
     for n in range(_LONGEST):
         while k + 1 < len(way) and is_after_end(lanes[way[k]], _arc_length(lanes[way[k]], state)):
             k += 1
@@ -170,14 +170,14 @@ def _stays(scene, lanes, way, k, state, dynamical, acceleration, steering, go):
         has_stopped |= n >= go and state[SPEED] <= 0.0 and abs(state[LATERAL_SPEED]) + abs(state[YAW_RATE]) < _STILL
         if has_stopped:
             again += 1
-        if again * scene.dt > _AGAIN:
+        if again * scene.table.dt > _AGAIN:
             return True
         s = scene.paths.offset[scene.track.path, way[k]] + _arc_length(lane, state)
         if n < go or has_stopped:
             a = throttle(scene, s, state[SPEED])
         else:
-            a = -min(scene.ego.a_min_brake, state[SPEED] / scene.dt)
-        move(state, a, lane_keeping(lane, state, a, dynamical, scene.dt), dynamical, scene.dt)
+            a = -min(scene.table.ego.a_min_brake, state[SPEED] / scene.table.dt)
+        move(state, a, lane_keeping(lane, state, a, dynamical, scene.table.dt), dynamical, scene.table.dt)
     return False
 
 

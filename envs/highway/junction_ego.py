@@ -6,6 +6,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.paths import Size, size_of
+from rss_shield.envs.roads.slip import slip_of
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, drift_of, is_outside, junction_of, list_threats, track_of
 from rss_shield.envs.worlds.signalised import SignalisedRoad
 from rss_shield.shield.comfort import ride_on
@@ -84,8 +85,7 @@ class JunctionEgo(ShieldedEgo):
         self._count(report, report, report.pairs, report.broken)
         ride_on(self.ride, self.poses[-1, 3], self.poses[-1, 2], np.inf, settings.table.dt)
         wish, command = (
-            Command(a, float(np.arctan(0.5 * np.tan(angle))))
-            for a, angle in ((acceleration, steering), (granted, steered))
+            Command(a, float(slip_of(angle))) for a, angle in ((acceleration, steering), (granted, steered))
         )
         changed = report.overridden and settings.overrides, report.anticipated, report.limited and settings.overrides
         self.look = Look(wish, command, *changed, report.response, -1, report.pairs > 0)
@@ -102,7 +102,7 @@ class JunctionEgo(ShieldedEgo):
 
     def _scene_of(self, track, threats, roads) -> Scene:
         settings, drift = self.settings, drift_of(roads, self.cars[-1], track)
-        return Scene(roads.paths, track, threats, settings.table.ego, settings.table.other, settings.table.dt, drift)
+        return Scene(roads.paths, track, threats, settings.table, drift)
 
     def _restrict(
         self, scene: Scene, acceleration: float, steering: float, holds: bool = False

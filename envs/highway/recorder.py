@@ -13,6 +13,7 @@ from rss_shield.envs.highway.egos import EgoShields
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.highway.step import shield_on
 from rss_shield.envs.options import LANES
+from rss_shield.envs.roads.slip import steering_of
 from rss_shield.envs.roads.traced import configuration, lane_id, lanes_of
 from rss_shield.envs.worlds.signalised import LINE, SignalisedRoad
 from rss_shield.shield.definitions.kinematics import stopping_distance
@@ -289,7 +290,7 @@ class _EgoFilm:
         name = response_name(look.response)
         seen: dict[str, Any] = {
             "wanted_acceleration": look.wish.acceleration,
-            "wanted_steering": float(np.arctan(2.0 * np.tan(look.wish.slip))),
+            "wanted_steering": float(steering_of(look.wish.slip)),
             "changed_by": CHANGED_BY.index(_changed_by(look)),
             "response": 0 if name == "none" else RESPONSES.index(name),
             "dangerous": look.dangerous,
@@ -360,9 +361,9 @@ def _see_plan(seen: dict[str, Any], shield: JunctionEgo, look: Look, film: Film)
     s, v = track.s, track.v
     a = look.command.acceleration
     for _ in range(go):
-        s, v = s + v * scene.dt, max(v + a * scene.dt, 0.0)
+        s, v = s + v * scene.table.dt, max(v + a * scene.table.dt, 0.0)
         a = throttle(scene, s, v)
-    s += stopping_distance(v, scene.ego.a_min_brake)
+    s += stopping_distance(v, scene.table.ego.a_min_brake)
     area, area_user = _areas(scene)
     seen |= {
         "plan": PLANS.index("go" if go > 0 else "stop") if go >= 0 else 0,

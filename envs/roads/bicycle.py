@@ -11,6 +11,7 @@ import numpy as np
 from highway_env.vehicle.dynamics import BicycleVehicle
 
 from rss_shield.envs.roads.network import CAR_LENGTH, heading_at, local_coordinates
+from rss_shield.envs.roads.slip import slip_of
 from rss_shield.envs.roads.steering import steering_angle
 from rss_shield.shield._numba.compiled import compiled
 from rss_shield.shield.geometry import wrap_angle
@@ -90,7 +91,7 @@ def move(state, acceleration, steering, dynamical, dt):
     if dynamical:
         _slide(state, acceleration, steering, dt)
         return
-    slip = np.arctan(0.5 * np.tan(steering))
+    slip = slip_of(steering)
     v, heading = state[SPEED], state[HEADING]
     state[X] += v * np.cos(heading + slip) * dt
     state[Y] += v * np.sin(heading + slip) * dt

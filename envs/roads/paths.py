@@ -20,6 +20,7 @@ from rss_shield.envs.roads.network import (
     local_coordinates,
     position,
 )
+from rss_shield.envs.roads.slip import slip_of
 from rss_shield.envs.roads.steering import steering_angle
 from rss_shield.shield._numba.compiled import compiled_for_arrays
 from rss_shield.shield.junctions.conflict_areas import (
@@ -300,7 +301,7 @@ def drive(lanes, way, start, speed, dt, track, length=CAR_LENGTH, begin=0.0):
             s, lateral = local_coordinates(lanes[way[k]], x, y)
         track[t, 0], track[t, 1], track[t, 2], track[t, 3] = start[k] + s, x, y, heading
         steering = steering_angle(lanes[way[k]], s, lateral, heading, speed, length)
-        slip = np.arctan(0.5 * np.tan(steering))
+        slip = slip_of(steering)
         x += speed * np.cos(heading + slip) * dt
         y += speed * np.sin(heading + slip) * dt
         heading += speed * np.sin(slip) / (length / 2) * dt

@@ -16,6 +16,18 @@ MAX_SLIP = float(np.arctan(np.tan(_MAX_STEERING) / 2))  # of a car's centre [rad
 
 
 @inner
+def slip_at(steering):
+    """Slip of a car's centre at a steering angle [rad]: its axles are equally far from it."""
+    return arctan(0.5 * tan(steering))
+
+
+@inner
+def steering_for(slip):
+    """The inverse of `slip_at` [rad]."""
+    return arctan(2.0 * tan(slip))
+
+
+@inner
 def is_aligned(lane, s, lateral, heading, speed):
     """Is there nothing to steer at a point in lane coordinates?"""
     return (lateral == 0.0) & (heading_at(lane, s + speed * PURSUIT) == heading)
@@ -28,7 +40,7 @@ def steering_angle(lane, s, lateral, heading, speed, length):
         return 0.0
     course = arcsin(_sine_back(lateral, speed))
     slip = arcsin(_sine_of_slip(lane, s, heading, speed, length, course))
-    return clip(arctan(2 * tan(slip)), -_MAX_STEERING, _MAX_STEERING)
+    return clip(steering_for(slip), -_MAX_STEERING, _MAX_STEERING)
 
 
 @inner

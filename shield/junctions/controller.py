@@ -166,7 +166,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
     """
     sort_out(scene, memory, entry)
     examine(scene, samples, which, SLACK + scene.drift)
-    limited = limit(nominal, scene.track.v, scene.ego, scene.dt)
+    limited = limit(nominal, scene.track.v, scene.table.ego, scene.table.dt)
     a, clear, trapped, anticipated = nominal, False, False, False
     if overrides:
         if rate > 0.0 and not holds:
@@ -231,7 +231,7 @@ def has_plan(scene, memory, entry, at_line):
         if follows and not (gap_is_safe or memory[i].behind):
             return False
     sort_out(scene, memory, entry)
-    brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
+    brake = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt)
     if stop_conflict(scene, brake, EVERYBODY, at_line, SLACK + scene.drift) == NEVER:
         return True
     return (
@@ -250,7 +250,7 @@ def leaves_plan(scene, samples, memory, wish, entry, at_line, which):
     slack = SLACK + scene.drift
     sort_out(scene, memory, entry)
     examine(scene, samples, which, slack)
-    a = limit(wish, scene.track.v, scene.ego, scene.dt)
+    a = limit(wish, scene.track.v, scene.table.ego, scene.table.dt)
     if stop_conflict(scene, a, EVERYBODY, at_line, slack) == NEVER:
         return True
     return go_plan(scene, a, EVERYBODY, at_line, slack)[0] >= 0
@@ -270,7 +270,7 @@ def sort_out(scene, memory, entry):
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         threat.ignored, threat.left_out = threat.follows, False
-        threat.stands_for = _stands_for(threat, memory[threat.user], entry, scene.dt) if threat.path >= 0 else 0.0
+        threat.stands_for = _stands_for(threat, memory[threat.user], entry, scene.table.dt) if threat.path >= 0 else 0.0
         look_ahead(scene, threat)
         if threat.path >= 0 and not threat.follows and entry != CAUTIOUS and not threat.wreck and threat.red_for == 0.0:
             obliged = entry == ASSERTIVE or threat.priority > 0
@@ -348,7 +348,7 @@ def _choose(scene, plan, a, at_line, holds):
             plan.go = go
             return a, True, False
     go_now = throttle(scene, scene.track.s, scene.track.v)
-    brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
+    brake = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt)
     if plan.go >= 0 and plan_conflict(scene, plan.go, EVERYBODY, 0.0) == NEVER:
         goes = plan.go > 0
         plan.go = max(plan.go - 1, 0)
@@ -363,9 +363,9 @@ def _ease(scene, plan, memory, wish, at_line, rate):
     Returns:
       (acceleration, does it leave a plan, does the wish as well). Without a plan nothing is decided.
     """
-    ego, slack = scene.ego, SLACK + scene.drift
+    ego, slack = scene.table.ego, SLACK + scene.drift
     limits = caps(scene, memory, at_line, rate)
-    rise = max(plan.held_at, -ego.a_min_brake) + RISE * scene.dt
+    rise = max(plan.held_at, -ego.a_min_brake) + RISE * scene.table.dt
     if stop_conflict(scene, wish, EVERYBODY, at_line, slack) == NEVER:
         if wish <= min(limits.behind, limits.line, rise):
             plan.go = 0
@@ -377,7 +377,7 @@ def _ease(scene, plan, memory, wish, at_line, rate):
         return a, True, True
     if plan.go > 0:  # what has begun is gone through with
         return wish, False, False
-    cap = limit(min(limits.behind, limits.line, rise), scene.track.v, ego, scene.dt)
+    cap = limit(min(limits.behind, limits.line, rise), scene.track.v, ego, scene.table.dt)
     a, stops = _largest_that_stops(scene, wish, cap, at_line)
     if stops:
         plan.go = 0
@@ -387,8 +387,8 @@ def _ease(scene, plan, memory, wish, at_line, rate):
 @apart
 def _ease_off(scene, plan, wish, limits, rise, at_line):
     """`_ease` where a wish leaves a plan to stop, but is more than its caps."""
-    track, dt, slack = scene.track, scene.dt, SLACK + scene.drift
-    rest = track.s + track.v * dt + stopping_distance(track.v + wish * dt, scene.ego.a_min_brake)
+    track, dt, slack = scene.track, scene.table.dt, SLACK + scene.drift
+    rest = track.s + track.v * dt + stopping_distance(track.v + wish * dt, scene.table.ego.a_min_brake)
     cap, line = min(limits.behind, rise), limits.line
     if rest >= limits.place:  # it comes to rest past the line
         line = np.inf
@@ -403,7 +403,7 @@ def _ease_off(scene, plan, wish, limits, rise, at_line):
                 plan.go -= 1
                 return go_now, True, True
     plan.go = 0
-    eased = limit(min(cap, line), track.v, scene.ego, dt)
+    eased = limit(min(cap, line), track.v, scene.table.ego, dt)
     if eased >= wish or stop_conflict(scene, eased, EVERYBODY, at_line, slack) != NEVER:
         return wish, True, True
     return eased, True, True
@@ -417,7 +417,7 @@ def _pull_away(scene, wish, go, cap, at_line, place):
       go: frames of throttle after the wish.
       place: the plan may not come to rest before it [m].
     """
-    eased = limit(cap, scene.track.v, scene.ego, scene.dt)
+    eased = limit(cap, scene.track.v, scene.table.ego, scene.table.dt)
     if eased < wish:
         gently, _ = go_plan_past(scene, eased, EVERYBODY, at_line, SLACK + scene.drift, place)
         if gently > 0:
@@ -433,7 +433,7 @@ def _largest_that_stops(scene, wish, cap, at_line):
       (acceleration, is there any), to within 2^-`SEARCH` of what is between braking and the wish.
     """
     slack = SLACK + scene.drift
-    low, high = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt), wish
+    low, high = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt), wish
     if cap < wish:
         if stop_conflict(scene, cap, EVERYBODY, at_line, slack) == NEVER:
             return cap, True
@@ -464,14 +464,14 @@ def _escape(scene, plan, go_now, brake):
         plan.go = go
         return go_now, True, False
     plan.go = -1
-    hard = limit(-scene.ego.a_max_brake, scene.track.v, scene.ego, scene.dt)
+    hard = limit(-scene.table.ego.a_max_brake, scene.track.v, scene.table.ego, scene.table.dt)
     best = brake
-    ways, at = _stops_among(scene, brake, scene.ego.a_min_brake)
-    hard_ways, hard_at = _stops_among(scene, hard, scene.ego.a_max_brake)
+    ways, at = _stops_among(scene, brake, scene.table.ego.a_min_brake)
+    hard_ways, hard_at = _stops_among(scene, hard, scene.table.ego.a_max_brake)
     if (hard_ways, -hard_at) < (ways, -at):
         best, ways, at = hard, hard_ways, hard_at
     # to stop comes first, unless somebody is about to arrive (junction hole H7)
-    if at * scene.dt < _IMMINENT and (_goes_among(scene, go_now), -go_at) < (ways, -at):
+    if at * scene.table.dt < _IMMINENT and (_goes_among(scene, go_now), -go_at) < (ways, -at):
         best = go_now
     return best, False, True
 
@@ -499,13 +499,13 @@ def _goes_among(scene, a):
 @inner
 def _with_way(scene, k):
     """The scene with one way of the others only."""
-    return Scene(scene.paths, scene.track, scene.threats[k : k + 1], scene.ego, scene.other, scene.dt, scene.drift)
+    return Scene(scene.paths, scene.track, scene.threats[k : k + 1], scene.table, scene.drift)
 
 
 @apart
 def _least_harm(scene, a, users):
     """Of what is left to a trapped ego, what breaks the fewest duties; braking if that breaks no more [m/s^2]."""
-    brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
+    brake = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt)
     best, fewest = a, _duties_broken(scene, a, users)
     if fewest > 0:
         broken = _duties_broken(scene, brake, users)
@@ -551,7 +551,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
       (dangerous, kept): is the ego not free toward this road user, and did it keep its duty? A contact is
       judged more strictly: whoever left itself no plan toward the other is to blame, trapped or not.
     """
-    _judge_motion(sample, memory, scene.other, scene.dt)
+    _judge_motion(sample, memory, scene.table.other, scene.table.dt)
     memory.was_lawless = memory.other_broke != KEPT
     scene = _alone_with(scene, i)
     memory.stood = memory.stood + 1 if abs(sample.speed) < STANDING and not sample.alert else 0
@@ -560,7 +560,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     dangerous, kept, items, cut_in = False, True, STOP, False
     followed, memory.behind = memory.behind, may_follow and (memory.behind or gap_is_safe)
     if not follows:
-        strongest = max(limit(scene.ego.a_max_accel, scene.track.v, scene.ego, scene.dt), a)
+        strongest = max(limit(scene.table.ego.a_max_accel, scene.track.v, scene.table.ego, scene.table.dt), a)
         if stop_conflict(scene, strongest, i, ANYWHERE, 0.0) != NEVER:
             dangerous = True
             if not clear:
@@ -569,7 +569,7 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
         cut_in = items == 0 and had_plan and memory.way != scene.track.path and memory.other_broke == KEPT
     if may_follow and not memory.behind:
         items = 0
-    too_hard = may_follow and a < -scene.ego.a_max_brake - _TOLERANCE
+    too_hard = may_follow and a < -scene.table.ego.a_max_brake - _TOLERANCE
     if too_hard and not gap_is_safe:
         dangerous, kept = True, False
     if items != 0:
@@ -606,7 +606,7 @@ def _alone_with(scene, i):
     for k in range(len(scene.threats)):
         if scene.threats[k].user == i:
             first, last = min(first, k), k + 1
-    return Scene(scene.paths, scene.track, scene.threats[first:last], scene.ego, scene.other, scene.dt, scene.drift)
+    return Scene(scene.paths, scene.track, scene.threats[first:last], scene.table, scene.drift)
 
 
 @inner
@@ -679,7 +679,7 @@ def _keeps_distance(scene, threat):
     """Is a road user behind the ego at a safe distance (Lemma 2)? Where their ways have parted none is needed."""
     distance = behind_by(scene.paths, scene.track, threat)
     gap = distance - scene.track.half_length - threat.half_length
-    return distance < 0.0 or gap >= distance_behind(threat, max(threat.v, 0.0), scene.track.v, scene.other)
+    return distance < 0.0 or gap >= distance_behind(threat, max(threat.v, 0.0), scene.track.v, scene.table.other)
 
 
 @apart
@@ -692,7 +692,7 @@ def _plans_and_duty(scene, i, a):
 @inner
 def _plans_now(scene, i):
     """Kinds of plans that stay clear of one road user from this sample on."""
-    brake = limit(-scene.ego.a_min_brake, scene.track.v, scene.ego, scene.dt)
+    brake = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt)
     if stop_conflict(scene, brake, i, ANYWHERE, 0.0) == NEVER:
         return STOP
     return GO if go_plan(scene, throttle(scene, scene.track.s, scene.track.v), i, ANYWHERE, 0.0)[0] >= 0 else 0
@@ -701,9 +701,9 @@ def _plans_now(scene, i):
 @inner
 def _is_resolute(scene, a):
     """Where there is no plan, does the ego brake or go on with all it has?"""
-    stops = scene.track.v + a * scene.dt <= _TOLERANCE
+    stops = scene.track.v + a * scene.table.dt <= _TOLERANCE
     goes = a >= throttle(scene, scene.track.s, scene.track.v) - _TOLERANCE
-    return stops or goes or a <= -scene.ego.a_min_brake + _TOLERANCE
+    return stops or goes or a <= -scene.table.ego.a_min_brake + _TOLERANCE
 
 
 @inner

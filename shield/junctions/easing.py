@@ -76,7 +76,7 @@ def approach_cap(room, room_next, v, brake, rate, dt):
 @inner
 def _before_line(scene, at_line, rate):
     """Cap before the first place where the ego may not rest, or an obstacle, and that place; none in the junction."""
-    paths, track, dt = scene.paths, scene.track, scene.dt
+    paths, track, dt = scene.paths, scene.track, scene.table.dt
     cells = paths.cells[track.path]
     here, end = cell_of(track.s, cells), cells
     if at_line:
@@ -91,7 +91,7 @@ def _before_line(scene, at_line, rate):
     if end == cells:
         return np.inf, -np.inf
     room = end * CELL - scene.drift - ROOM - track.s
-    return approach_cap(room, room - track.v * dt, track.v, scene.ego.a_min_brake, rate, dt), end * CELL
+    return approach_cap(room, room - track.v * dt, track.v, scene.table.ego.a_min_brake, rate, dt), end * CELL
 
 
 @inner
@@ -100,8 +100,8 @@ def _behind_others(scene, memory, rate):
 
     The other may brake at `a_max_brake`, the ego brakes at `a_min_brake`.
     """
-    track, dt, cap = scene.track, scene.dt, np.inf
-    brake, brake_other = scene.ego.a_min_brake, scene.other.a_max_brake
+    track, dt, cap = scene.track, scene.table.dt, np.inf
+    brake, brake_other = scene.table.ego.a_min_brake, scene.table.other.a_max_brake
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if threat.path < 0 or threat.ignored or threat.left_out:

@@ -23,7 +23,7 @@ def held_by(scene, nominal, users, at_line):
     Returns:
       The index, -1 = nobody: a light or the road itself is in the way.
     """
-    a, slack = limit(nominal, scene.track.v, scene.ego, scene.dt), SLACK + scene.drift
+    a, slack = limit(nominal, scene.track.v, scene.table.ego, scene.table.dt), SLACK + scene.drift
     who, soonest = -1, NEVER
     for i in range(users):
         if stop_conflict(scene, a, i, at_line, slack) != NEVER:
@@ -51,7 +51,7 @@ def _is_closed(scene):
 @apart
 def _first_met(scene, a, i, slack):
     """First frame on which a road user is met, whether the ego brakes or goes on; `NEVER` if it is not."""
-    go_on = plan_conflict(scene, int(_FORESIGHT / scene.dt), i, slack)
+    go_on = plan_conflict(scene, int(_FORESIGHT / scene.table.dt), i, slack)
     return min(stop_conflict(scene, a, i, ANYWHERE, slack), go_on)
 
 

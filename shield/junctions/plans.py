@@ -27,7 +27,7 @@ from rss_shield.shield.definitions.kinematics import (
 from rss_shield.shield.definitions.longitudinal import d_min_following
 from rss_shield.shield.definitions.right_of_way import can_stop_before
 from rss_shield.shield.junctions.conflict_areas import CELL, Paths, cell_of, in_conflict
-from rss_shield.shield.params import RSSParams
+from rss_shield.shield.params import RSSParams, Table
 
 STOP, GO = 1, 2  # kinds of plans
 PLAN_NAMES = {0: "inherited", STOP: "stop", GO: "go", STOP | GO: "both"}
@@ -108,9 +108,7 @@ class Scene(NamedTuple):
     paths: Paths
     track: Track
     threats: np.ndarray  # `[M]` THREAT
-    ego: RSSParams
-    other: RSSParams
-    dt: float  # length of a frame [s]
+    table: Table
     drift: float = 0.0  # the ego may come this much further, or less far, than a plan says [m]
 
 
@@ -172,7 +170,7 @@ def fastest(threat, t, other):
 @inner
 def follows(scene, s, v, threat, t):
     """Would a road user be behind the ego, at `s` with speed `v`, on its lane by then, at a safe distance (Lemma 2)?"""
-    track, other = scene.track, scene.other
+    track, other = scene.track, scene.table.other
     if threat.path < 0 or threat.wreck or not _shares_lane(scene.paths, track.path, s, threat):
         return False
     s_other = on_path_of_ego(scene.paths, track, s, threat, farthest(threat, t, other))
@@ -241,7 +239,7 @@ def meets(scene, s, slack, threat, t, resting):
 
     With a `slack` [m], the ego may be that much further or less far than at `s`.
     """
-    track, other = scene.track, scene.other
+    track, other = scene.track, scene.table.other
     leaves = track.beside >= 0 and (t <= track.leaves_after or s <= track.leaves_at)
     if threat.path < 0:
         return _overlaps(scene.paths, track.path, s, slack, threat.from_cell, threat.to_cell) or (
@@ -279,7 +277,7 @@ def can_give_way(scene, threat):
         return False
     paths, track = scene.paths, scene.track
     entry = paths.first[track.path, threat.path, cell_of(track.s, paths.cells[track.path])]
-    return can_stop_before(entry - CELL - threat.s, max(threat.v, 0.0), scene.other)
+    return can_stop_before(entry - CELL - threat.s, max(threat.v, 0.0), scene.table.other)
 
 
 @inner
@@ -297,7 +295,7 @@ def look_ahead(scene, threat):
     if entry == np.inf:
         threat.free_until = NEVER
         return
-    threat.free_until = _frames_before(threat, entry, scene.other, scene.dt)
+    threat.free_until = _frames_before(threat, entry, scene.table.other, scene.table.dt)
     threat.joins = paths.joins[track.path, threat.path, cell_of(track.s, paths.cells[track.path])]
 
 
@@ -332,9 +330,9 @@ def step(s, v, a, dt):
 @compiled
 def throttle(scene, s, v):
     """Acceleration of a plan's throttle phase: up to the speed limit [m/s^2]."""
-    paths, path, ego = scene.paths, scene.track.path, scene.ego
+    paths, path, ego = scene.paths, scene.track.path, scene.table.ego
     cap = min(ego.v_cap, paths.speed_limit[path, cell_of(s, paths.cells[path])])
-    return min(ego.a_max_accel, max((cap - v) / scene.dt, 0.0))
+    return min(ego.a_max_accel, max((cap - v) / scene.table.dt, 0.0))
 
 
 @inner
@@ -357,7 +355,7 @@ def _meets_anyone(scene, s, v, n, only, slack):
 
     Whoever is a follower by then counts no more for the rest of the plan.
     """
-    t = n * scene.dt
+    t = n * scene.table.dt
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if not _counts(threat, n, only):
@@ -391,7 +389,7 @@ def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
       at_line: the ego may rest only where it is in nobody's way, whoever may come.
       slack: how exactly the ego is known to follow the plan [m].
     """
-    paths, path, dt = scene.paths, scene.track.path, scene.dt
+    paths, path, dt = scene.paths, scene.track.path, scene.table.dt
     rest = s + v * dt + stopping_distance(v, brake) + scene.drift
     if at_line and paths.crossed[path, cell_of(rest, paths.cells[path])]:
         return n
@@ -421,7 +419,7 @@ def _rest(scene, s, v, n, brake, slack):
 
     In closed form, and frame by frame where the difference by rounding might matter to `meets`.
     """
-    dt = scene.dt
+    dt = scene.table.dt
     frames = (v - _REST) / (brake * dt)
     whole = max(np.ceil(frames), 0.0)
     s_rest = s + dt * whole * (v - 0.5 * brake * dt * (whole - 1.0))
@@ -451,8 +449,8 @@ def _is_clear(scene, s, n, s_rest, n_rest, slack, threat):
         return True
     if threat.path < 0 or threat.v < 0.0 or scene.track.beside >= 0:
         return False
-    low = nearest(threat, n * scene.dt, scene.other) - _ROUNDING
-    high = farthest(threat, n_rest * scene.dt, scene.other) + _ROUNDING
+    low = nearest(threat, n * scene.table.dt, scene.table.other) - _ROUNDING
+    high = farthest(threat, n_rest * scene.table.dt, scene.table.other) + _ROUNDING
     end = s_rest + slack + _ROUNDING
     return not _conflicts(scene.paths, scene.track.path, s - slack, end, threat.path, low, high)
 
@@ -463,7 +461,7 @@ def _may_fall_behind(scene, s, v, n, s_rest, brake, threat):
 
     The gap grows only while the ego is faster than the other may be, and the distance that a follower needs only grows.
     """
-    paths, track, other, t = scene.paths, scene.track, scene.other, n * scene.dt
+    paths, track, other, t = scene.paths, scene.track, scene.table.other, n * scene.table.dt
     s_rest += _ROUNDING
     if threat.path < 0 or threat.wreck or not _may_follow(scene, s_rest, threat):
         return False
@@ -473,7 +471,7 @@ def _may_fall_behind(scene, s, v, n, s_rest, brake, threat):
     faster = max(v - v_other, 0.0)
     s_other = farthest(threat, t, other) - _furthest_ahead(paths, track.path, s, s_rest, threat.path)
     gap = s - track.half_length - threat.half_length - s_other
-    widest = gap + faster * scene.dt + stopping_distance(faster, brake) + _ROUNDING
+    widest = gap + faster * scene.table.dt + stopping_distance(faster, brake) + _ROUNDING
     return widest > 0.0 and widest >= distance_behind(threat, v_other, v, other)
 
 
@@ -499,20 +497,20 @@ def _meets_braking(scene, s, v, n, n_rest, brake, until, slack, threat, falls_be
     single_until = n_rest if falls_behind else n  # frame up to which single frames are looked at
     while n < until:
         if single_until <= n < n_rest - _STRIDE:
-            if _is_clear(scene, s, n, s + _STRIDE * v * scene.dt, n + _STRIDE, slack, threat):
+            if _is_clear(scene, s, n, s + _STRIDE * v * scene.table.dt, n + _STRIDE, slack, threat):
                 for _ in range(_STRIDE):
-                    s, v = step(s, v, -brake, scene.dt)
+                    s, v = step(s, v, -brake, scene.table.dt)
                 n += _STRIDE
                 continue
             single_until = n + _STRIDE
-        t, resting = n * scene.dt, v <= _REST
+        t, resting = n * scene.table.dt, v <= _REST
         if falls_behind and _may_follow(scene, s, threat) and follows(scene, s, v, threat, t):
             return NEVER
         if (resting or n >= threat.free_until) and meets(scene, s, slack, threat, t, resting):
             return n
         if resting:
             return NEVER
-        s, v = step(s, v, -brake, scene.dt)
+        s, v = step(s, v, -brake, scene.table.dt)
         n += 1
     return NEVER
 
@@ -521,8 +519,8 @@ def _meets_braking(scene, s, v, n, n_rest, brake, until, slack, threat, falls_be
 def stop_conflict(scene, a, only, at_line, slack):
     """First frame on which "this frame `a`, then brake" meets somebody, `NEVER` if none."""
     begin(scene)
-    s, v = step(scene.track.s, scene.track.v, a, scene.dt)
-    return tail_conflict(scene, s, v, NEXT, scene.ego.a_min_brake, only, at_line, slack)
+    s, v = step(scene.track.s, scene.track.v, a, scene.table.dt)
+    return tail_conflict(scene, s, v, NEXT, scene.table.ego.a_min_brake, only, at_line, slack)
 
 
 @compiled
@@ -533,12 +531,12 @@ def first_met(scene, a, brake):
     needs longer than the longest plan is none.
     """
     begin(scene)
-    s, v = step(scene.track.s, scene.track.v, a, scene.dt)
+    s, v = step(scene.track.s, scene.track.v, a, scene.table.dt)
     n = NEXT
-    while n * scene.dt < _LONGEST:
+    while n * scene.table.dt < _LONGEST:
         if _meets_anyone(scene, s, v, n, EVERYBODY, 0.0):
             return n
-        s, v = step(s, v, -brake, scene.dt)
+        s, v = step(s, v, -brake, scene.table.dt)
         n += 1
     return NEVER
 
@@ -558,17 +556,17 @@ def go_plan(scene, a, only, at_line, slack):
 def go_plan_past(scene, a, only, at_line, slack, place):
     """`go_plan`, but none that comes to rest before a `place` [m]."""
     begin(scene)
-    s, v = step(scene.track.s, scene.track.v, a, scene.dt)
+    s, v = step(scene.track.s, scene.track.v, a, scene.table.dt)
     n, latest = NEXT, NOW
-    while n * scene.dt < _LONGEST:
+    while n * scene.table.dt < _LONGEST:
         if _meets_anyone(scene, s, v, n, only, slack):
             return -1, max(latest, n)
-        if n % _TAIL == 2 and s + stopping_distance(v, scene.ego.a_min_brake) >= place:
-            conflict = tail_conflict(scene, s, v, n, scene.ego.a_min_brake, only, at_line, slack)
+        if n % _TAIL == 2 and s + stopping_distance(v, scene.table.ego.a_min_brake) >= place:
+            conflict = tail_conflict(scene, s, v, n, scene.table.ego.a_min_brake, only, at_line, slack)
             if conflict == NEVER:
                 return n - 1, NEVER
             latest = max(latest, conflict)
-        s, v = step(s, v, throttle(scene, s, v), scene.dt)
+        s, v = step(s, v, throttle(scene, s, v), scene.table.dt)
         n += 1
     return -1, latest
 
@@ -581,5 +579,5 @@ def plan_conflict(scene, go, only, slack):
     for n in range(go):
         if n > 0 and _meets_anyone(scene, s, v, n, only, slack):
             return n
-        s, v = step(s, v, throttle(scene, s, v), scene.dt)
-    return tail_conflict(scene, s, v, go, scene.ego.a_min_brake, only, ANYWHERE, slack)
+        s, v = step(s, v, throttle(scene, s, v), scene.table.dt)
+    return tail_conflict(scene, s, v, go, scene.table.ego.a_min_brake, only, ANYWHERE, slack)

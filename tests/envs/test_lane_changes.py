@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 from highway_env.vehicle.controller import ControlledVehicle
-from junction_world import DT, EGO, TABLE, junction
+from junction_world import DT, RULED, junction
 
 import rss_shield
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, drift_of, track_of
@@ -57,7 +57,7 @@ class Changing:
         return bool(min(abs(self.lane.local_coordinates(corner)[1]) for corner in corners) < REACH)
 
     def scene(self, threats) -> Scene:
-        return Scene(self.junction.roads.paths, self.track(), threats, EGO, TABLE.other, DT)
+        return Scene(self.junction.roads.paths, self.track(), threats, RULED)
 
 
 def half_way(old=OLD, new=NEW) -> Changing:

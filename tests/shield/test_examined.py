@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
-from junction_world import DT, EGO, TABLE, arms, crossing_pairs, junction
+from junction_world import RULED, arms, crossing_pairs, junction
 
 from rss_shield import make, make_vec
 from rss_shield.shield.junctions.conflict_areas import cell_of
@@ -33,7 +33,7 @@ def scene_of(path, s, v, others):
     for i, (threat, (other, s_other, v_other)) in enumerate(zip(threats, others, strict=True)):
         threat["user"], threat["path"], threat["s"], threat["v"] = i, other, s_other, v_other
         threat["half_length"] = 2.5
-    return Scene(junction().roads.paths, Track(path, s, v, 2.5, -1, 0.0), threats, EGO, TABLE.other, DT)
+    return Scene(junction().roads.paths, Track(path, s, v, 2.5, -1, 0.0), threats, RULED)
 
 
 def examined(scene, which, samples=None):

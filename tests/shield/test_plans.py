@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from junction_world import DT, EGO, TABLE, Duel, arms, crossing_pairs, junction, verdict_of
+from junction_world import DT, EGO, RULED, TABLE, Duel, arms, crossing_pairs, junction, verdict_of
 
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, _fitting
 from rss_shield.shield._numba.compiled import compiled
@@ -159,7 +159,7 @@ def test_behind_a_leader_a_plan_is_lemma_2(v):
     clear = []
     for gap in np.arange(0.0, 20.0, 0.25):
         duel = Duel(path, path, 20.0, v, 20.0 + 5.0 + gap, 6.0)
-        scene = Scene(roads.paths, Track(path, 20.0, v, 2.5, -1, 0.0), duel.threats, EGO, TABLE.other, DT)
+        scene = Scene(roads.paths, Track(path, 20.0, v, 2.5, -1, 0.0), duel.threats, RULED)
         clear.append(plan_conflict(scene, 0, -1, 0.0) == NEVER)
     nearest = np.arange(0.0, 20.0, 0.25)[clear.index(True)]
     d_min = max(v**2 / (2 * EGO.a_min_brake) - 6.0**2 / (2 * TABLE.other.a_max_brake), 0.0)
@@ -172,7 +172,7 @@ def test_braking_earlier_never_makes_a_clear_stop_unclear():
     for a, b in crossing_pairs()[::3]:
         duel = Duel(a, b, rng.uniform(60, 97), rng.uniform(0, 9), rng.uniform(40, 100), rng.uniform(0, 9))
         track = Track(a, duel.s, duel.v, 2.5, -1, 0.0)
-        scene = Scene(duel.roads.paths, track, duel.threats, EGO, TABLE.other, DT)
+        scene = Scene(duel.roads.paths, track, duel.threats, RULED)
         if stop_conflict(scene, 3.0, -1, False, 0.0) == NEVER and duel.s < 99.0:
             assert stop_conflict(scene, -3.0, -1, False, 0.0) == NEVER
 
@@ -246,7 +246,7 @@ def crowd(env_id, rng):
     threats["user"], threats["path"] = np.arange(10), rng.integers(len(paths.cells), size=10)
     threats["s"], threats["v"] = rng.uniform(0.0, 0.5 * paths.cells[threats["path"]]), rng.uniform(-1.0, 12.0, 10)
     threats["cap"], threats["half_length"], threats["wreck"] = roads.limit, 2.5, rng.random(10) < 0.1
-    scene = Scene(paths, ego, threats, EGO, TABLE.other, DT)
+    scene = Scene(paths, ego, threats, RULED)
     memory, stands = np.zeros(10, CROSSING), rng.random(10) < 0.2
     threats["v"][stands] = rng.uniform(-0.4, 0.45, stands.sum())
     memory["stood"], memory["counted_on"] = 1000, rng.integers(60, size=10)
@@ -283,9 +283,9 @@ def looks(scene, s, v, n, only, slack, resting):
         threat = scene.threats[k]
         if threat.ignored or threat.left <= n or 0 <= only != threat.user:
             continue
-        if follows(scene, s, v, threat, n * scene.dt):
+        if follows(scene, s, v, threat, n * scene.table.dt):
             threat.left = n
-        elif meets(scene, s, slack, threat, n * scene.dt, resting):
+        elif meets(scene, s, slack, threat, n * scene.table.dt, resting):
             return True
     return False
 
@@ -296,7 +296,7 @@ def stop_frame_by_frame(scene, s, v, n, brake, only, slack):
     while v > 1e-9:
         if looks(scene, s, v, n, only, slack, False):
             return n
-        s, v = step(s, v, -brake, scene.dt)
+        s, v = step(s, v, -brake, scene.table.dt)
         n += 1
     return n if looks(scene, s, v, n, only, slack, True) else NEVER
 
@@ -311,7 +311,7 @@ def go_frame_by_frame(scene, a, only, slack):
             return -1
         if n % 3 == 2:
             left = threats["left"].copy()
-            if stop_frame_by_frame(scene, s, v, n, scene.ego.a_min_brake, only, slack) == NEVER:
+            if stop_frame_by_frame(scene, s, v, n, scene.table.ego.a_min_brake, only, slack) == NEVER:
                 return n - 1
             threats["left"] = left
         s, v = s + v * DT, max(v + throttle(scene, s, v) * DT, 0.0)
@@ -380,11 +380,11 @@ def test_nobody_comes_sooner_than_foreseen_nor_much_later(env_id):
             entry = paths.first[track.path, threat["path"], cell_of(track.s - SLACK, paths.cells[track.path])]
             until = int(threat["free_until"])
             if until < 1000:
-                assert until == 0 or farthest(threat, (until - 1) * DT, scene.other) < entry
-                assert farthest(threat, until * DT, scene.other) > entry - 1e-6
+                assert until == 0 or farthest(threat, (until - 1) * DT, scene.table.other) < entry
+                assert farthest(threat, until * DT, scene.table.other) > entry - 1e-6
                 counted += until > 10
             else:
-                assert farthest(threat, 100.0, scene.other) < entry
+                assert farthest(threat, 100.0, scene.table.other) < entry
     assert counted > 100
 
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rss_shield.envs.roads.slip import slip_of
 from rss_shield.eval.suite.judge.contacts import near_pairs, touches
 from rss_shield.eval.suite.judge.smoothing import EXACT, SURE, Noise, sigma_of
 from rss_shield.eval.suite.judge.world import World, views
@@ -64,7 +65,7 @@ def slips(trace: Trace) -> np.ndarray:
     By the wheels where the log has them, else by where everybody is one sample later. Who hardly moves has none.
     """
     u = trace.users
-    slip = np.arctan(0.5 * np.tan(u.steering))
+    slip = slip_of(u.steering)
     dx, dy = np.diff(u.x, axis=0), np.diff(u.y, axis=0)
     course = np.where(u.speed[:-1] >= 0.0, np.arctan2(dy, dx), np.arctan2(-dy, -dx))
     moved = (course - u.heading[:-1] + np.pi) % (2.0 * np.pi) - np.pi

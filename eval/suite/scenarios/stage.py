@@ -12,6 +12,7 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.recorder import Film
 from rss_shield.envs.highway.step import begin_step
 from rss_shield.envs.options import LANES, Settings
+from rss_shield.envs.roads.slip import steering_of
 from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.lanes.controller import response_name
 from rss_shield.shield.params import RSSParams, Rules, Table
@@ -112,7 +113,7 @@ class Scripted(Vehicle):
             return 0.0
         course = np.arcsin(np.clip(lateral_speed / self.speed, -0.5, 0.5)) + (np.pi if self.script.turned else 0.0)
         slip = (course - self.heading + np.pi) % (2.0 * np.pi) - np.pi
-        return float(np.clip(np.arctan(2.0 * np.tan(np.clip(slip, -0.4, 0.4))), -_TURNS, _TURNS))
+        return float(np.clip(steering_of(np.clip(slip, -0.4, 0.4)), -_TURNS, _TURNS))
 
 
 @dataclass
