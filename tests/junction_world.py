@@ -10,7 +10,8 @@ from rss_shield.envs.roads.ways import Junction, junction_of
 from rss_shield.shield.junctions.conflict_areas import cell_of, in_conflict
 from rss_shield.shield.junctions.controller import CAUTIOUS, CROSSING, PLAN, SAMPLE, judge_crossing, junction_frame
 from rss_shield.shield.junctions.examined import TABLE as TABLE_ONLY
-from rss_shield.shield.junctions.plans import THREAT, Scene, Track
+from rss_shield.shield.junctions.plans import Scene, Track
+from rss_shield.shield.junctions.reach import THREAT
 from rss_shield.shield.params import DEFAULT_RULES, PRESETS, Table
 from rss_shield.shield.verdicts import VERDICTS
 

@@ -17,9 +17,10 @@ from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
 from rss_shield.shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
 from rss_shield.shield.lanes.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
+from rss_shield.shield.lanes.far_pairs import least_margin, own_share
 from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame
 from rss_shield.shield.lanes.memory import MEMORY, forget_safe
-from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, least_cosine, least_margin, own_share, slowed
+from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, least_cosine, slowed
 
 _HALF_DIAGONAL = np.hypot(CAR_LENGTH, CAR_WIDTH) / 2  # no road user is longer, however it is turned [m]
 _ROUNDING = 1e-6  # more than world and lane coordinates differ by [m]

@@ -25,7 +25,8 @@ from rss_shield.shield.junctions.controller import (
     junction_frame,
 )
 from rss_shield.shield.junctions.held_back import held_by
-from rss_shield.shield.junctions.plans import NEVER, THREAT, Scene, Track
+from rss_shield.shield.junctions.plans import NEVER, Scene, Track
+from rss_shield.shield.junctions.reach import THREAT
 from rss_shield.shield.tally import count_change, note_executed
 from rss_shield.shield.verdicts import Verdict
 

@@ -24,7 +24,6 @@ from rss_shield.shield.junctions.plans import (
     NEVER,
     PATIENCE,
     SLACK,
-    STANDING,
     START_UP,
     STOP,
     Scene,
@@ -40,6 +39,7 @@ from rss_shield.shield.junctions.plans import (
     stop_conflict,
     throttle,
 )
+from rss_shield.shield.junctions.reach import STANDING
 from rss_shield.shield.lanes.controller import RESPONSE_BRAKE, RESPONSE_GO
 from rss_shield.shield.verdicts import (
     ACCELERATED,

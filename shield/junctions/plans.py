@@ -19,14 +19,13 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.definitions.kinematics import (
-    response_distance,
     stopping_distance,
     time_to_cover_accelerating,
-    travel,
 )
 from rss_shield.shield.definitions.longitudinal import d_min_following
 from rss_shield.shield.definitions.right_of_way import can_stop_before
 from rss_shield.shield.junctions.conflict_areas import CELL, Paths, cell_of, in_conflict
+from rss_shield.shield.junctions.reach import SHORT_CUT, SHORT_CUT_SHARE, STANDING, farthest, fastest, nearest
 from rss_shield.shield.params import RSSParams, Table
 
 STOP, GO = 1, 2  # kinds of plans
@@ -44,12 +43,8 @@ ANY_PLACE = -np.inf  # a plan may come to rest before it
 # Rule J9. Who has stood for `PATIENCE` has to notice first that somebody counts on that: it stands for `START_UP` more.
 PATIENCE = (15.0, 5.0, 5.0)  # by `entry`: cautious, priority, assertive [s]
 START_UP = 2.5  # from when the ego has no other plan [s]
-STANDING = 0.5  # slower than this is standing: highway-env's drivers creep [m/s]
 
 SLACK = 0.2  # a new plan stays clear even if the ego is this far off; one in force only has to stay clear [m]
-_SHORT_CUT = 1.0  # a car that cuts the corners of its path gains or loses at most this ...
-_SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
-_REVERSE = 1.0  # a car that reverses may go on for this long [s]
 _TAIL = 3  # frames between two moments at which a go plan may begin to brake
 _LONGEST = 10.0  # throttle phase of a plan, at most [s]
 _BETWEEN = 3.0  # cars that follow each other are in each other's way with so much between them, margins included [m]
@@ -58,35 +53,6 @@ _STRIDE = 8  # frames of a plan that are looked at together
 _FEW = 250.0  # frames, in which rounding ...
 _ROUNDING = 1e-9  # ... moves a place by less than this [m] ...
 _UNSURE = 1e-10  # ... and a moment by less than this many frames
-
-# One way that a road user may take. SI units.
-THREAT = np.dtype(
-    [
-        ("user", "i8"),  # index of the road user, -1 = nobody: a red light
-        ("path", "i8"),  # row in `Paths`; -1 = an obstacle off all paths
-        ("s", "f8"),  # arc length of the centre on that path
-        ("v", "f8"),  # speed, negative in reverse
-        ("cap", "f8"),  # speed above which it does not accelerate
-        ("half_length", "f8"),
-        ("wreck", "?"),  # has crashed: it may stop on the spot
-        ("priority", "i8"),  # +1: the ego has the right of way over it, -1: the other way round
-        ("stands_for", "f8"),  # it is counted on to stand for this long still [s]; 0 = it is not
-        ("red_for", "f8"),  # it is counted on to wait at a light for this long [s]; 0 = it is not
-        ("line", "f8"),  # and until then its centre stays behind this arc length [m]
-        ("follows", "?"),  # drives behind the ego on its way
-        ("ignored", "?"),  # behind the ego on its lane, or obliged and able to give way
-        ("left_out", "?"),  # the ego's plans are not checked against it: see `shield.junctions.examined`
-        ("stops_here", "?"),  # who is behind it on its approach is not looked at
-        ("left", "i8"),  # frame of the plan from which on it is a follower
-        ("free_until", "i8"),  # frame of a plan before which it cannot reach the ego's path ahead
-        ("joins", "i8"),  # cell of the ego's path from which on it may be on the ego's lane
-        ("from_cell", "i8"),  # cells of the ego's path in the way of an obstacle
-        ("to_cell", "i8"),
-        ("from_cell_beside", "i8"),  # likewise of the path of the lane that it is leaving
-        ("to_cell_beside", "i8"),
-    ],
-    align=True,
-)
 
 
 class Track(NamedTuple):
@@ -110,58 +76,6 @@ class Scene(NamedTuple):
     threats: np.ndarray  # `[M]` THREAT
     table: Table
     drift: float = 0.0  # the ego may come this much further, or less far, than a plan says [m]
-
-
-# ---------------------------------------------------------------- where others may be
-
-
-@inner
-def nearest(threat, t, other):
-    """Least arc length at which a road user can be `t` from now [m]."""
-    if threat.wreck:
-        return threat.s
-    if threat.v < 0.0:
-        return threat.s + threat.v * min(t, _REVERSE)
-    driven = travel(t, threat.v, 0.0, 0.0, other.a_max_brake)
-    return threat.s + driven - _short_cut(driven)
-
-
-@compiled
-def farthest(threat, t, other):
-    """Largest arc length at which it can be `t` from now [m]."""
-    if threat.wreck:
-        return threat.s + max(threat.v, 0.0)  # a wreck rolls to rest with a time constant of 1 s
-    if threat.stands_for > 0.0:
-        creeps, t = min(t, threat.stands_for), max(t - threat.stands_for, 0.0)
-        driven = STANDING * creeps + response_distance(STANDING, t, other.a_max_accel, threat.cap)
-    else:
-        driven = response_distance(max(threat.v, 0.0), t, other.a_max_accel, threat.cap)
-    if threat.red_for > 0.0:
-        driven = min(driven, threat.line - threat.s + _beyond_line(max(t - threat.red_for, 0.0), other))
-    return threat.s + driven + _short_cut(driven)
-
-
-@inner
-def _beyond_line(t, other):
-    """How far behind a stop line a car can be `t` after it may go, if until then it was able to stop there [m].
-
-    With v = sqrt(2 b d) at a distance d it comes to v t + a t^2 / 2 - d, at most when v = b t.
-    """
-    return 0.5 * (other.a_max_accel + other.a_min_brake) * t**2
-
-
-@inner
-def _short_cut(driven):
-    """How far progress along a path may differ from the distance driven [m]."""
-    return min(_SHORT_CUT_SHARE * driven, _SHORT_CUT)
-
-
-@inner
-def fastest(threat, t, other):
-    """Largest speed it can have `t` from now [m/s]."""
-    if threat.stands_for > 0.0:
-        return max(STANDING, min(STANDING + other.a_max_accel * max(t - threat.stands_for, 0.0), threat.cap))
-    return max(threat.v, min(threat.v + other.a_max_accel * t, threat.cap), 0.0)
 
 
 # ---------------------------------------------------------------- the ego and one of them
@@ -308,7 +222,7 @@ def _frames_before(threat, s, other, dt):
     if threat.wreck:
         return NOW if farthest(threat, 0.0, other) >= s else NEVER - 1
     distance = s - threat.s - _ROUNDING
-    driven = max(distance - _SHORT_CUT, distance / (1.0 + _SHORT_CUT_SHARE))
+    driven = max(distance - SHORT_CUT, distance / (1.0 + SHORT_CUT_SHARE))
     if threat.stands_for > 0.0:
         rest = driven - STANDING * threat.stands_for
         starting = time_to_cover_accelerating(rest, STANDING, other.a_max_accel, threat.cap)

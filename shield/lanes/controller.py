@@ -11,6 +11,7 @@ from rss_shield.shield.definitions.kinematics import time_to_collision
 from rss_shield.shield.definitions.lateral import d_min_no_credit
 from rss_shield.shield.geometry import signed_gap
 from rss_shield.shield.lanes.anticipation import acceleration_cap, farthest_bound, lateral_cap
+from rss_shield.shield.lanes.far_pairs import least_margin, own_share
 from rss_shield.shield.lanes.frame import beyond
 from rss_shield.shield.lanes.lane_changes import room_beside
 from rss_shield.shield.lanes.memory import (
@@ -29,8 +30,6 @@ from rss_shield.shield.lanes.pair import (
     is_following,
     leading_speed,
     least_cosine,
-    least_margin,
-    own_share,
     toward,
 )
 from rss_shield.shield.sampling import lateral_euler_margin, reach_from_rest, sampling_margin, slowest_in_danger

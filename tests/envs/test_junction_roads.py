@@ -10,7 +10,8 @@ from rss_shield.envs.roads.paths import STOCK, _starts, drive
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, junction_of, list_threats, track_of
 from rss_shield.shield.junctions.conflict_areas import cell_of, reach_beyond
 from rss_shield.shield.junctions.controller import CROSSING, SAMPLE
-from rss_shield.shield.junctions.plans import ANY, THREAT
+from rss_shield.shield.junctions.plans import ANY
+from rss_shield.shield.junctions.reach import THREAT
 
 GENERIC = "roundabout-generic-v0"
 

@@ -13,7 +13,8 @@ import rss_shield
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, drift_of, track_of
 from rss_shield.shield.junctions.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, X, Y
 from rss_shield.shield.junctions.controller import block
-from rss_shield.shield.junctions.plans import NEVER, SLACK, THREAT, Scene, stop_conflict
+from rss_shield.shield.junctions.plans import NEVER, SLACK, Scene, stop_conflict
+from rss_shield.shield.junctions.reach import THREAT
 
 ENV = "roundabout-v0"
 OLD, NEW = ("ee", "nx", 1), ("ee", "nx", 0)  # the inner and the outer lane of a ring

@@ -8,7 +8,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 from rss_shield import make
 from rss_shield.envs.worlds.signalised import COLOURS, ENV_ID, LINE, compile_signal
 from rss_shield.shield.definitions.signals import GREEN, RED, YELLOW, SignalPlan, time_to_change, time_to_green
-from rss_shield.shield.junctions.plans import THREAT, farthest
+from rss_shield.shield.junctions.reach import THREAT, farthest
 from rss_shield.shield.params import PRESETS
 
 SIGNAL = {"green": 8.0, "yellow": 3.0, "all_red": 2.0}

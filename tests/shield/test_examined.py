@@ -22,7 +22,8 @@ from rss_shield.shield.junctions.examined import (
     examine,
 )
 from rss_shield.shield.junctions.examined import TABLE as TABLE_ONLY
-from rss_shield.shield.junctions.plans import SLACK, THREAT, Scene, Track
+from rss_shield.shield.junctions.plans import SLACK, Scene, Track
+from rss_shield.shield.junctions.reach import THREAT
 
 ENV_ID, FASTER = "intersection-v0", 2
 

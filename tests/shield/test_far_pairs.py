@@ -6,8 +6,9 @@ import pytest
 from rss_shield import make
 from rss_shield.shield.lanes.anticipation import acceleration_cap, lateral_cap
 from rss_shield.shield.lanes.controller import find_danger
+from rss_shield.shield.lanes.far_pairs import least_margin, own_share
 from rss_shield.shield.lanes.memory import MEMORY, remember
-from rss_shield.shield.lanes.pair import ROAD_USER, assess, leading_speed, least_cosine, least_margin, own_share
+from rss_shield.shield.lanes.pair import ROAD_USER, assess, leading_speed, least_cosine
 from rss_shield.shield.params import PRESETS, Rules, Table
 
 DT = 0.2

@@ -11,7 +11,8 @@ from rss_shield import make_vec
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, list_threats
 from rss_shield.shield.junctions.conflict_areas import cell_of
 from rss_shield.shield.junctions.controller import CROSSING, SAMPLE, judge_crossing
-from rss_shield.shield.junctions.plans import ANY, THREAT, Track, farthest
+from rss_shield.shield.junctions.plans import ANY, Track
+from rss_shield.shield.junctions.reach import THREAT, farthest
 from rss_shield.shield.verdicts import CUT_IN, DUTIES, INHERITED, KEPT, LEFT_NO_PLAN, OTHER, TOO_FAR, TOO_HARD
 from rss_shield.shield.verdicts import EGO as AT_FAULT
 

@@ -17,12 +17,10 @@ from rss_shield.shield.junctions.controller import (
 from rss_shield.shield.junctions.plans import (
     NEVER,
     SLACK,
-    THREAT,
     Scene,
     Track,
     _rest,
     begin,
-    farthest,
     follows,
     go_plan,
     meets,
@@ -32,6 +30,7 @@ from rss_shield.shield.junctions.plans import (
     tail_conflict,
     throttle,
 )
+from rss_shield.shield.junctions.reach import THREAT, farthest
 
 STARTS = [(s, v) for s in (70.0, 88.0, 97.0) for v in (0.0, 9.0)]
 OTHERS = [(s, v) for s in (55.0, 80.0, 95.0) for v in (3.0, 9.0)]
