@@ -136,3 +136,8 @@ def _git(*arguments: str) -> str | None:
 def pages_of(folder: Path) -> tuple[Path, ...]:
     """Pages on which episodes of a run play, by name."""
     return tuple(sorted((folder / PAGES).glob("*.html")))
+
+
+def filmstrips_of(folder: Path) -> tuple[Path, ...]:
+    """Pictures of the same episodes, by name; each is there as .pdf, too."""
+    return tuple(sorted((folder / PAGES).glob("*.png")))

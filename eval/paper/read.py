@@ -1,6 +1,7 @@
 """Runs and sweeps as sections of a report."""
 
 import json
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from rss_shield.eval.paper.compared import as_texts, comparisons
 from rss_shield.eval.paper.figures import plot_comfort, plot_profiles
 from rss_shield.eval.paper.section import Figure, Section, Table
 from rss_shield.eval.plots import plot_blame, plot_learning_curve, save
-from rss_shield.eval.run_folder import pages_of
+from rss_shield.eval.run_folder import filmstrips_of, pages_of
 from rss_shield.eval.runs.points import groups_of, with_front
 from rss_shield.eval.runs.tables import plot_front, shown_metrics, texts, wide
 from rss_shield.eval.stats import Interval, interquartile_mean, probability_of_improvement
@@ -112,6 +113,11 @@ def _figures_of_run(folder: Path, figures: Path, config: dict[str, Any], episode
         yield Figure("Who needs the shield, and what it earns with it and without.", figures / "frontier.png")
     if plot_comfort(summary, figures, road):
         yield Figure("How the ride feels.", figures / "comfort.png")
+    for strip in filmstrips_of(folder):
+        for suffix in (".png", ".pdf"):
+            shutil.copyfile(strip.with_suffix(suffix), figures / f"{strip.stem}{suffix}")
+        text = f"{strip.stem}: five moments from above (the ego blue, who it was about red), and the margins over time."
+        yield Figure(text, figures / strip.name)
 
 
 def _of_sweep(folder: Path, figures: Path) -> Section:

@@ -1,4 +1,4 @@
-"""Episodes worth watching, as pages on which they play: the worst and the most typical one of an arm."""
+"""Episodes worth watching, as pages on which they play and as filmstrips: the worst and the most typical of an arm."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -10,6 +10,7 @@ import pandas as pd
 from rss_shield.envs.highway.recorder import record_trace
 from rss_shield.eval.replay import playback
 from rss_shield.eval.run_folder import PAGES
+from rss_shield.eval.viewer.filmstrip import write_filmstrip
 from rss_shield.eval.viewer.page import write_replay_page
 from rss_shield.shield.verdicts import AT_FAULT
 
@@ -62,7 +63,9 @@ def show(
         if not path.exists():
             traces = [_traced(make(test), episodes, seed) for test, episodes in tests.items()]
             labels = [f"shield {test}" if test in ("off", "on") else test for test in tests]
-            write_replay_page(traces, path, labels, f"{title}: {kind} episode, seed {seed}")
+            heading = f"{title}: {kind} episode, seed {seed}"
+            write_filmstrip(traces, labels, path, heading)
+            write_replay_page(traces, path, labels, heading)
         files.append(path)
         progress(len(tests) * (i + 1))
     return files
