@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rss_shield.envs.fast.config import Unsupported as Unsupported
     from rss_shield.envs.highway.drivers import RecklessVehicle as RecklessVehicle
+    from rss_shield.envs.highway.explained import ExplainedRender as ExplainedRender
     from rss_shield.envs.highway.multi_agent import MultiAgentShield as MultiAgentShield
     from rss_shield.envs.highway.parallel import parallel_env as parallel_env
     from rss_shield.envs.highway.wrapper import ShieldWrapper as ShieldWrapper
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from rss_shield.shield import on_road as on_road
 
 _PUBLIC = {
+    "ExplainedRender": "envs.highway.explained",
     "MultiAgentShield": "envs.highway.multi_agent",
     "RecklessVehicle": "envs.highway.drivers",
     "ShieldWrapper": "envs.highway.wrapper",

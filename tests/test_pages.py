@@ -31,6 +31,7 @@ SCRIPTS = {
     "parameters_and_rules": "an ablation, judged in full: blame ego",
     "judge_a_log": "5.50 s: contact of ego and other, at fault: ego; ego braked less than the proper response asks",
     "baseline": "the shield: at fault in 0 of 5",
+    "explained_video": "explained.webp: 12 pictures",
     "drive_and_test": "drive_and_test:drive on highway-fast-v0, 20 episodes",
 }
 

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 from highway_env.vehicle.objects import Landmark
 
+from rss_shield.envs.highway.around import around
 from rss_shield.envs.highway.ego import Look, ShieldedEgo
 from rss_shield.envs.highway.egos import EgoShields
 from rss_shield.envs.highway.junction_ego import JunctionEgo
@@ -22,12 +23,10 @@ from rss_shield.shield.junctions.conflict_areas import CELL, X, Y, cell_of
 from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.plans import throttle
 from rss_shield.shield.lanes.controller import response_name
-from rss_shield.shield.lanes.pair import assess
 from rss_shield.shield.trace import (
     CHANGED_BY,
     PLANS,
     RESPONSES,
-    SIDES,
     SIGNALS,
     Contact,
     Ego,
@@ -324,26 +323,9 @@ def _changed_by(look: Look) -> str:
 
 def _see_neighbours(seen: dict[str, Any], shield: ShieldedEgo, film: Film) -> None:
     """Gap and required gap to the nearest in each direction."""
-    ego, users = shield.last
-    gap, required, neighbour = np.full(4, np.nan), np.full(4, np.nan), np.full(4, -1)
-    if len(users):
-        ds, dy = users["s"] - ego["s"], users["y"] - ego["y"]
-        lon = np.abs(ds) - ego["half_length"] - users["half_length"]
-        lat = np.abs(dy) - ego["half_width"] - users["half_width"]
-        in_lane, alongside = lat < 0.0, (lon < 0.0) & (lat >= 0.0)
-        for k, (among, distance) in enumerate(
-            ((in_lane & (ds >= 0.0), lon), (in_lane & (ds < 0.0), lon), (alongside & (dy < 0.0), lat),
-             (alongside & (dy >= 0.0), lat))
-        ):  # fmt: skip
-            if not among.any():
-                continue
-            i = int(np.argmin(np.where(among, distance, np.inf)))
-            pair = assess(ego, users[i], shield.settings.table)
-            along = SIDES[k] in ("ahead", "behind")
-            gap[k] = pair.gap_lon if along else pair.gap_lat
-            required[k] = gap[k] - (pair.margin_lon if along else pair.margin_lat)
-            neighbour[k] = film._row_of(shield.others[i])
-    seen |= {"gap": gap, "required": required, "neighbour": neighbour}
+    gap, required, nearest = around(shield)
+    neighbour = np.array([film._row_of(shield.others[i]) if i >= 0 else -1 for i in nearest])
+    seen.update(gap=gap, required=required, neighbour=neighbour)
 
 
 def _see_plan(seen: dict[str, Any], shield: JunctionEgo, look: Look, film: Film) -> int:
