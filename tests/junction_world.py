@@ -12,13 +12,13 @@ from rss_shield.shield.junctions.controller import CAUTIOUS, CROSSING, PLAN, SAM
 from rss_shield.shield.junctions.examined import TABLE as TABLE_ONLY
 from rss_shield.shield.junctions.plans import Scene, Track
 from rss_shield.shield.junctions.reach import THREAT
-from rss_shield.shield.params import DEFAULT_RULES, PRESETS, Table
+from rss_shield.shield.params import PRESETS, Rules, Table
 from rss_shield.shield.verdicts import VERDICTS
 
 DT = 1 / 15
 TABLE = PRESETS["intersection"]
 EGO = TABLE.ego._replace(response_time=2 / 15)
-RULED = Table(EGO, TABLE.other, DEFAULT_RULES, DT)
+RULED = Table(EGO, TABLE.other, Rules(), DT)
 
 
 @cache

@@ -14,6 +14,7 @@ from rss_shield.shield.junctions.controller import (
     PRIORITY,
     sort_out,
 )
+from rss_shield.shield.junctions.frame_by_frame import go_frame_by_frame, stop_frame_by_frame
 from rss_shield.shield.junctions.plans import (
     NEVER,
     SLACK,
@@ -21,14 +22,10 @@ from rss_shield.shield.junctions.plans import (
     Track,
     _rest,
     begin,
-    follows,
     go_plan,
-    meets,
     plan_conflict,
-    step,
     stop_conflict,
     tail_conflict,
-    throttle,
 )
 from rss_shield.shield.junctions.reach import THREAT, farthest
 
@@ -273,48 +270,6 @@ def test_looking_ahead_saves_work_and_changes_nothing(env_id):
         changed_by_haste += conflicts(scene, a, only, slack) != foreseen
     assert far > 200
     assert changed_by_haste > 0
-
-
-@compiled
-def looks(scene, s, v, n, only, slack, resting):
-    """Is anybody met on a frame? Looked at one by one."""
-    for k in range(len(scene.threats)):
-        threat = scene.threats[k]
-        if threat.ignored or threat.left <= n or 0 <= only != threat.user:
-            continue
-        if follows(scene, s, v, threat, n * scene.table.dt):
-            threat.left = n
-        elif meets(scene, s, slack, threat, n * scene.table.dt, resting):
-            return True
-    return False
-
-
-@compiled
-def stop_frame_by_frame(scene, s, v, n, brake, only, slack):
-    """`tail_conflict` without bounds."""
-    while v > 1e-9:
-        if looks(scene, s, v, n, only, slack, False):
-            return n
-        s, v = step(s, v, -brake, scene.table.dt)
-        n += 1
-    return n if looks(scene, s, v, n, only, slack, True) else NEVER
-
-
-def go_frame_by_frame(scene, a, only, slack):
-    """Frames of throttle of a `go_plan`, without bounds."""
-    s, v = max(scene.track.s + scene.track.v * DT, 0.0), max(scene.track.v + a * DT, 0.0)
-    threats = scene.threats
-    threats["left"] = NEVER
-    for n in range(1, 150):
-        if looks(scene, s, v, n, only, slack, False):
-            return -1
-        if n % 3 == 2:
-            left = threats["left"].copy()
-            if stop_frame_by_frame(scene, s, v, n, scene.table.ego.a_min_brake, only, slack) == NEVER:
-                return n - 1
-            threats["left"] = left
-        s, v = s + v * DT, max(v + throttle(scene, s, v) * DT, 0.0)
-    return -1
 
 
 @pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0"])
