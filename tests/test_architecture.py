@@ -10,7 +10,7 @@ from places import ROOT
 
 LIBRARIES = {
     "shield": {"numpy", "numba"},
-    "envs": {"gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo"},
+    "envs": {"gymnasium", "highway_env", "llvmlite", "numba", "numpy", "pettingzoo", "matplotlib", "PIL"},
     "agents": {"gymnasium", "sb3_contrib", "stable_baselines3", "torch", "numpy"},
     "eval": {
         "numpy",
@@ -64,7 +64,7 @@ MAY_IMPORT = {
     "eval.runs": {"eval.stats", "eval.metrics", "eval.plots", "eval.table", "eval.files"}
     | {"eval.config_option", "eval.interrupt"},
     "eval.trace_risk": {"shield.geometry", "shield.lanes", "shield.params", "shield.risk", "shield.trace"},
-    "eval.viewer": {"eval.files", "eval.trace_risk", "shield.geometry", "shield.risk", "shield.trace"},
+    "eval.viewer": {"eval.files", "eval.plots", "eval.trace_risk", "shield.geometry", "shield.risk", "shield.trace"},
 }
 # what a package may import besides itself; one part of eval knows simulators and agents
 BELOW_PACKAGE = {
