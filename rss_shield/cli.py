@@ -4,6 +4,7 @@ import importlib
 import sys
 
 from rss_shield.eval.interrupt import stop_on_interrupt
+from rss_shield.experiment import expanded
 
 COMMANDS = {
     "train": ("rss_shield.train", "train", "train with and without the shield, test, compare"),
@@ -38,4 +39,10 @@ def main(argv: list[str] | None = None) -> None:
         if (error.name or "").startswith("rss_shield"):
             raise
         sys.exit(f"rss-shield {name} needs the package {error.name!r}: pip install 'rss-shield[{extra}]'")
-    command.run(rest)
+    try:
+        lines = expanded(name, rest)
+    except (ValueError, OSError) as error:
+        print(f"rss-shield {name}: error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    for line in lines:
+        command.run(line)

@@ -115,6 +115,19 @@ def experiment_of(given: Mapping[str, Any]) -> Experiment:
     )
 
 
+def as_words(options: Mapping[str, Any]) -> list[str]:
+    """Options of an experiment as a command line says them: {"rules.memory": False} is --rules.memory False."""
+    words = []
+    for name, value in options.items():
+        flag = name.replace("_", "-")
+        if isinstance(value, bool) and not name.startswith("rules."):
+            words.append(f"--{flag}" if value else f"--no-{flag}")
+            continue
+        values = value if isinstance(value, list | tuple) else [value]
+        words += [f"--{flag}", *map(str, values)]
+    return words
+
+
 def _drawn(sweep: Mapping[str, Any]) -> Drawn | None:
     if "random" in sweep:
         given = _mapping(sweep, "random")

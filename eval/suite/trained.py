@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rss_shield import train
+from rss_shield.eval.runs.experiment import as_words
 from rss_shield.eval.runs.store import Files
 
 _KEPT = ("learning_curve.csv", "removal_curve.csv", "model.zip", "card.json", "README.md")
@@ -44,10 +45,7 @@ def arguments_of(config: dict[str, Any]) -> list[str]:
         )
     words = ["--env-id", config["environment"], "--arms", config["arm"], "--seeds", str(config["seed"])]
     words += ["--eval-episodes", str(config["episodes"]), "--replay-episodes", "0"]
-    for name, value in config["options"].items():
-        values = value if isinstance(value, list | tuple) else [value]
-        words += [f"--{name.replace('_', '-')}", *map(str, values)]
-    return words
+    return words + as_words(config["options"])
 
 
 def _quietly(call: Any, arguments: list[str]) -> None:
