@@ -4,6 +4,7 @@
     python bench/campaign.py --list          what it consists of, and what is done
     python bench/campaign.py --plan short    the most telling arms with fewer seeds and decisions (two hours on 2 cores)
     python bench/campaign.py --write         docs/results/agents.md from what is done; with --list nothing is trained
+    python bench/campaign.py --ship          models/ENVIRONMENT/ARM from the first seeds of what is done, made small
     python bench/campaign.py --divide 1000 -- --n-envs 2 --replay-episodes 0     try the whole chain
     python bench/campaign.py -- --workers 1  further options of train.py
 
@@ -13,11 +14,13 @@ the 13 s of their training, and the frontier of each road is drawn from all of i
 """
 
 import argparse
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
 
+from rss_shield.agents.slim import write_slim
 from rss_shield.eval.arms import ARMS
 from rss_shield.eval.paper.agents import write
 
@@ -112,6 +115,7 @@ def main() -> None:
     parser.add_argument(
         "--write", action="store_true", help="write docs/results/agents.md from the parts that are done"
     )
+    parser.add_argument("--ship", action="store_true", help="copy the models of the first seed into models/")
     parser.add_argument("--runs-dir", type=Path, default=Path("runs"), help="folder of all runs (default: %(default)s)")
     parser.add_argument("--divide", type=int, default=1, help="decisions and episodes by this number, and one seed")
     parser.add_argument("more", nargs="*", metavar="-- OPTION", help="further options of train.py")
@@ -124,7 +128,7 @@ def main() -> None:
     if unknown:
         parser.error(f"--parts {' '.join(unknown)}: expected some of {', '.join(plan)}")
     chosen = [part for part in plan.values() if arguments.parts is None or part.name in arguments.parts]
-    if arguments.list:
+    if arguments.list or arguments.ship:
         for part in chosen:
             done = "done" if is_done(part, runs) else "to do"
             print(f"{part.name}: {done}; {part.decisions} decisions, {part.seeds} seeds, {', '.join(part.arms)}")
@@ -132,6 +136,19 @@ def main() -> None:
         play(chosen, runs, arguments)
     if arguments.write:
         print(f"written: {write([folder_of(part, runs) for part in chosen], ROOT / 'docs' / 'results')}")
+    if arguments.ship:
+        for part in chosen:
+            ship(part, runs, ROOT / "models")
+
+
+def ship(part: Part, runs: Path, to: Path) -> None:
+    """Copy the models of a part's first seed, without what only training needs, and their cards."""
+    for model in sorted(folder_of(part, runs).glob("*-seed0/model.zip")):
+        folder = to / part.env_id / model.parent.name.removesuffix("-seed0")
+        write_slim(model, folder / "model.zip")
+        for card in ("card.json", "card.md"):
+            shutil.copyfile(model.parent / card, folder / card)
+        print(f"written: {folder}")
 
 
 def play(chosen: list[Part], runs: Path, arguments: argparse.Namespace) -> None:
