@@ -1,17 +1,19 @@
 """Many environments at once, on either simulator."""
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv, VectorWrapper
 from gymnasium.wrappers import RecordEpisodeStatistics
 from highway_env.envs.common.action import DiscreteMetaAction
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.arguments import rules_of, seed_of, whole
 from rss_shield.envs.fast.config import Unsupported, compile_scenario
+from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
 from rss_shield.envs.fast.vector import FastVectorEnv
 from rss_shield.envs.make import make
 from rss_shield.envs.options import (
@@ -40,6 +42,7 @@ def make_vec(
     config: dict | None = None,
     threads: int = 1,
     autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
+    wrappers: Sequence[Callable[[Any], Any]] = (),
     **kwargs: Any,
 ) -> VectorEnv:
     """Environments side by side, each with a shield around its ego.
@@ -56,9 +59,12 @@ def make_vec(
       config: as for `gymnasium.make` of a highway-env environment.
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
-      kwargs: `max_episode_steps`; `rules`, `intervention_penalty`, `penalty_on`, `entry`, `intent`, `waiting`,
-        `examine`, `filter`, `filter_at`, `correction`, `replace` and `risk` of `ShieldWrapper`; and whatever else
-        `make` takes (`judge_params`, ...) where the backend is "highway-env".
+      wrappers: put around in this order: gymnasium's `VectorWrapper`s around the whole on either backend, and wrappers
+        of single environments around each where the backend is "highway-env".
+      kwargs: `max_episode_steps`; `render_mode` (the engine knows "rgb_array"); `rules`, `intervention_penalty`,
+        `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `replace` and `risk`
+        of `ShieldWrapper`; and whatever else `make` takes (`traffic`, `judge_params`, ...) where the backend is
+        "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.
@@ -72,28 +78,60 @@ def make_vec(
         raise ValueError(f"backend = {backend!r}: expected one of {', '.join(BACKENDS)}")
     if shield is not None and shield not in MODES:
         raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
+    if not isinstance(wrappers, Sequence) or not all(callable(wrapper) for wrapper in wrappers):
+        raise ValueError(f"wrappers = {wrappers!r}: expected a list of wrappers")
+    around = [wrapper for wrapper in wrappers if _is_for_batches(wrapper)]
+    within = [wrapper for wrapper in wrappers if not _is_for_batches(wrapper)]
+    if within and backend == "fast":
+        name = getattr(within[0], "__name__", repr(within[0]))
+        raise Unsupported(f"wrappers = [{name}]", "gymnasium.vector.VectorWrapper classes, or backend = 'highway-env'")
     given, rest = split({"params": params, **kwargs})
     options = Options.of(given)
+    envs: VectorEnv
     if backend == "highway-env":
         arguments = {**given, **rest, "config": config}
-        return _SideBySide(
-            [partial(_make_counted, env_id, shield, arguments)] * num_envs, autoreset_mode=autoreset_mode
-        )
+        one = partial(_make_counted, env_id, shield, within, arguments)
+        envs = _SideBySide([one] * num_envs, autoreset_mode=autoreset_mode)
+    else:
+        envs = _in_engine(env_id, num_envs, shield, options, config, threads, autoreset_mode, rest)
+    for wrapper in around:
+        envs = wrapper(envs)
+    return envs
+
+
+def _in_engine(
+    env_id: str,
+    num_envs: int,
+    shield: str | None,
+    options: Options,
+    config: dict | None,
+    threads: int,
+    autoreset_mode: AutoresetMode,
+    rest: dict[str, Any],
+) -> FastVectorEnv:
     _check_supported(options, rest)
     scenario = compile_scenario(env_id, config, max_episode_steps=rest.get("max_episode_steps"))
     settings = _settings_in(scenario.stock, shield, options) if shield is not None else None
     penalty, by_change = float(options.intervention_penalty), options.penalty_on == "change"
     replaces, risk = shield is not None and options.replace == "decision", _risk_in(shield, options)
-    return FastVectorEnv(scenario, num_envs, settings, penalty, autoreset_mode, threads, by_change, replaces, risk)
+    rules = settings, penalty, autoreset_mode, threads, by_change, replaces, risk, rest.get("render_mode")
+    return FastVectorEnv(scenario, num_envs, *rules)
+
+
+def _is_for_batches(wrapper: Any) -> bool:
+    return isinstance(wrapper, type) and issubclass(wrapper, VectorWrapper)
 
 
 def _check_supported(options: Options, rest: dict[str, Any]) -> None:
     """Does the engine know all that is asked for?"""
     unknown = {name: getattr(options, name) for name in _OF_HIGHWAY_ENV}
     unknown = {name: value for name, value in unknown.items() if value != _OF_HIGHWAY_ENV[name]}
-    others = {name: value for name, value in rest.items() if value is not None and name != "max_episode_steps"}
+    known = ("max_episode_steps", "render_mode")
+    others = {name: value for name, value in rest.items() if value is not None and name not in known}
     for name, value in (unknown | others).items():
         raise Unsupported(f"{name} = {value!r}", "backend = 'highway-env'")
+    if rest.get("render_mode") not in (None, *RENDER_MODES):
+        raise Unsupported(f"render_mode = {rest['render_mode']!r}", f"{RENDER_MODES[0]!r}, or backend = 'highway-env'")
 
 
 def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
@@ -124,7 +162,6 @@ _OF_HIGHWAY_ENV = {
 _OF_GYMNASIUM = {  # arguments of its `make_vec` that mean something else here
     "vectorization_mode": "backend = 'fast' or 'highway-env'",
     "vector_kwargs": "autoreset_mode and threads",
-    "wrappers": "wrappers around what make_vec returns",
 }
 
 
@@ -144,5 +181,8 @@ def _autoreset(mode: Any) -> AutoresetMode:
         raise ValueError(f"autoreset_mode = {mode!r}: expected one of {names}") from None
 
 
-def _make_counted(env_id: str, shield: str | None, options: dict) -> gym.Env:
-    return RecordEpisodeStatistics(make(env_id, shield, **options))
+def _make_counted(env_id: str, shield: str | None, wrappers: list, options: dict) -> gym.Env:
+    env: gym.Env = RecordEpisodeStatistics(make(env_id, shield, **options))
+    for wrapper in wrappers:
+        env = wrapper(env)
+    return env

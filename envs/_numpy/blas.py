@@ -26,4 +26,16 @@ def find_rounding() -> str:
     return min(agree, default=PLAIN)
 
 
+def three_are_known(rounding: str) -> bool:
+    """Does `np.dot` go on with a third product as with the second?"""
+    known = rounding != FUSED_FIRST
+    for a, b in np.random.default_rng(1).normal(size=(_TRIALS, 2, 3)):
+        total = float(a[0] * b[0])
+        for x, y in zip(a[1:], b[1:], strict=True):
+            total = total + float(x * y) if rounding == PLAIN else float(Fraction(x) * Fraction(y) + Fraction(total))
+        known &= total == np.dot(a, b)
+    return bool(known)
+
+
 ROUNDING = find_rounding()
+THREE_ARE_KNOWN = three_are_known(ROUNDING)

@@ -34,6 +34,14 @@ def dot(ax, ay, bx, by):
 
 
 @inner
+def dot_3(ax, ay, az, bx, by, bz):
+    """`np.dot` of two vectors of three, where `blas.THREE_ARE_KNOWN`."""
+    if ROUNDING == FUSED_SECOND:
+        return _fma(az, bz, _fma(ay, by, ax * bx))
+    return ax * bx + ay * by + az * bz
+
+
+@inner
 def norm(x, y):
     """`np.linalg.norm` of a plane vector."""
     return np.sqrt(dot(x, y, x, y))

@@ -118,8 +118,8 @@ def overlap(first, second, corners, dt):
     away_x, away_y = 0.0, 0.0
     if _are_apart(first, second, dt):
         return False, False, away_x, away_y
-    _fill_corners(first, corners[0])
-    _fill_corners(second, corners[1])
+    fill_corners(first, corners[0])
+    fill_corners(second, corners[1])
     move_x = first.speed * first.cos * dt - second.speed * second.cos * dt
     move_y = first.speed * first.sin * dt - second.speed * second.sin * dt
     centre_x = _mean(corners[0, :, 0]) - _mean(corners[1, :, 0])
@@ -181,7 +181,8 @@ def _gap(far, step, half_sizes):
 
 
 @inner
-def _fill_corners(car, corners):
+def fill_corners(car, corners):
+    """Corners of the car's box, counted around it, into `[4, 2]` [m]."""
     for p in range(4):
         along = -car.length / 2 if p < 2 else car.length / 2
         across = -car.width / 2 if p == 0 or p == 3 else car.width / 2

@@ -9,6 +9,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from rss_shield.envs._numpy.floats import clip, dot, not_zero
 from rss_shield.envs._numpy.ufuncs import power, power_each
+from rss_shield.envs.fast.linear_drivers import linear_acceleration, linear_steering
 from rss_shield.envs.fast.sight import car_ahead, car_behind, locate
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
 from rss_shield.envs.roads.network import distance, is_after_end, is_reachable, local_coordinates, position
@@ -47,16 +48,22 @@ def decide(cars, first, last, n, changing, net, lanes, sight, idm):
     Returns:
       `changing`, with those that have just begun.
     """
-    _speed_up(cars, first, last, lanes, sight, idm)
+    _speed_up(cars, first, last, lanes, sight, idm, sight.linear)
     busy = _follow(cars, first, last, n, net, lanes, sight, idm)
     changing = _change_lanes(cars, busy, n, changing, net, lanes, sight, idm)
-    _carry_out(cars, first, last, lanes, sight, idm)
+    _carry_out(cars, first, last, lanes, sight, idm, sight.linear)
     return changing
 
 
 @inner
-def _speed_up(cars, first, last, lanes, sight, idm):
-    """Accelerations on a free road."""
+def _speed_up(cars, first, last, lanes, sight, idm, linear):
+    """Accelerations on a free road, which linear drivers do not ask for."""
+    if linear is None:
+        _speed_up_idm(cars, first, last, lanes, sight, idm)
+
+
+@inner
+def _speed_up_idm(cars, first, last, lanes, sight, idm):
     count = 0
     for i in range(first, last):
         sight.some[count] = i
@@ -78,7 +85,7 @@ def _follow(cars, first, last, n, net, lanes, sight, idm):
         if _is_in_traffic(car):
             locate(k, i, cars, lanes, sight)
             ahead = car_ahead(car.lane, i, n, net, lanes, sight)
-            sight.wanted[i] = sight.free[i] - _interaction(cars, i, ahead, lanes, sight.s, idm)
+            sight.wanted[i] = _behind(cars, i, ahead, sight.free[i], lanes, sight.s, idm, sight.linear)
             sight.some[busy] = i
             thinks = car.changes_lane & (idm.lane_change_delay < car.timer)
             busy += thinks | (k != car.lane) | is_after_end(lanes[k], sight.s[k, i])
@@ -105,7 +112,8 @@ def _change_lanes(cars, busy, n, changing, net, lanes, sight, idm):
             _change_lane(cars, i, n, changing, free, sight.wanted[i], net, lanes, sight, idm)
         if car.lane != car.target_lane:
             ahead = car_ahead(car.target_lane, i, n, net, lanes, sight)
-            sight.wanted[i] = min(sight.wanted[i], free - _interaction(cars, i, ahead, lanes, sight.s, idm))
+            there = _behind(cars, i, ahead, free, lanes, sight.s, idm, sight.linear)
+            sight.wanted[i] = min(sight.wanted[i], there)
             if settled:
                 sight.changing[changing] = i
                 changing += 1
@@ -113,7 +121,7 @@ def _change_lanes(cars, busy, n, changing, net, lanes, sight, idm):
 
 
 @inner
-def _carry_out(cars, first, last, lanes, sight, idm):
+def _carry_out(cars, first, last, lanes, sight, idm, linear):
     """Commands for what was decided."""
     turning = 0
     for i in range(first, last):
@@ -126,6 +134,16 @@ def _carry_out(cars, first, last, lanes, sight, idm):
             sight.some[turning] = i
             turning += not is_aligned(lanes[k], sight.s[k, i], sight.lateral[k, i], car.heading, car.speed)
     steer(cars, turning, lanes, sight)
+    if linear is not None:
+        _steer_linear(cars, first, last, lanes, sight, linear)
+
+
+@part
+def _steer_linear(cars, first, last, lanes, sight, linear):
+    for i in range(first, last):
+        car, k = cars[i], cars[i].target_lane
+        if _is_in_traffic(car):
+            car.steering = linear_steering(car, lanes[k], sight.s[k, i], sight.lateral[k, i], linear[5])
 
 
 @inner
@@ -236,6 +254,16 @@ def _lane_on(road, lane_id, k, x, y, net, lanes):
 
 
 @inner
+def _behind(cars, i, ahead, free, lanes, s, idm, linear):
+    """Acceleration of car `i` behind another, -1 = none; `free` is IDM's on a free road [m/s^2]."""
+    if linear is None:
+        wanted = free - _interaction(cars, i, ahead, lanes, s, idm)
+    else:
+        wanted = linear_acceleration(cars[i], cars, i, ahead, lanes, s, idm)
+    return wanted
+
+
+@inner
 def _speed_ratio(car, lanes):
     """Speed over the speed that a car wants on its lane."""
     target = 0.0 if car.kind == DIRECT else car.target_speed
@@ -258,7 +286,17 @@ def _interaction(cars, i, ahead, lanes, s, idm):
 
 
 @inner
-def _has_to_brake(cars, i, ahead, delta, lanes, s, idm):
+def _has_to_brake(cars, i, ahead, lanes, s, idm, linear):
+    """Would car `i`, -1 = none, brake harder behind car `ahead`, who asks, than a change of lanes may impose on it?"""
+    if linear is None:
+        brakes = _has_to_brake_idm(cars, i, ahead, cars[ahead].delta, lanes, s, idm)
+    else:
+        brakes = linear_acceleration(cars[ahead], cars, i, ahead, lanes, s, idm) < -idm.max_braking_imposed
+    return brakes
+
+
+@inner
+def _has_to_brake_idm(cars, i, ahead, delta, lanes, s, idm):
     """Would car `i`, -1 = none, brake harder behind car `ahead` than a change of lanes may impose on it?
 
     `delta` is the exponent of whoever asks. The power is left out where the answer does not depend on it.
@@ -338,7 +376,7 @@ def _is_change_worthwhile(cars, i, k, n, free, a, net, lanes, sight, idm):
     """
     car = cars[i]
     ahead = car_ahead(k, i, n, net, lanes, sight)
-    there = free - _interaction(cars, i, ahead, lanes, sight.s, idm)
+    there = _behind(cars, i, ahead, free, lanes, sight.s, idm, sight.linear)
     helps = there - a >= idm.min_acc_gain
     if car.route >= 0 and car.route_step < route_length(net, car.route):
         lane_id = net.route_lanes[car.route, car.route_step]
@@ -348,4 +386,4 @@ def _is_change_worthwhile(cars, i, k, n, free, a, net, lanes, sight, idm):
     if not helps:
         return False
     behind = car_behind(k, i, n, net, lanes, sight)
-    return not _has_to_brake(cars, behind, i, car.delta, lanes, sight.s, idm)
+    return not _has_to_brake(cars, behind, i, lanes, sight.s, idm, sight.linear)

@@ -17,6 +17,7 @@ from rss_shield.envs.decisions.foresight import without_anticipation
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.draws import load_generator
 from rss_shield.envs.fast.drivers import take_meta_action
+from rss_shield.envs.fast.envs.intersection import let_traffic_flow, open_intersection
 from rss_shield.envs.fast.foresight import foresee, make_desk
 from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.guard import (
@@ -35,16 +36,19 @@ from rss_shield.envs.fast.guard import (
     start_watch,
     watch_frame,
 )
+from rss_shield.envs.fast.linear_drivers import start_habits
 from rss_shield.envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past, no_lane_frames
-from rss_shield.envs.fast.observations import observe
-from rss_shield.envs.fast.rewards import NO_ACTION, is_terminated, is_truncated, rate
+from rss_shield.envs.fast.rating import is_truncated
 from rss_shield.envs.fast.risk import RISK, Field, begin_looks, compile_field, meter_of, report_risk, start_risk
-from rss_shield.envs.fast.scenes import make_scene
 from rss_shield.envs.fast.sight import make_sight, sort_along_x
-from rss_shield.envs.fast.state import CAR, EPISODE, STEP
+from rss_shield.envs.fast.state import CAR, EPISODE, LINEAR_CAR, STEP
+from rss_shield.envs.fast.tasks import is_terminated, make_scene, rate
 from rss_shield.envs.fast.threads import Crew
-from rss_shield.envs.fast.traffic_flow import let_traffic_flow, open_intersection
+from rss_shield.envs.fast.views.apart import call_of
+from rss_shield.envs.fast.views.record import NONE, View
+from rss_shield.envs.fast.views.usual import observe
 from rss_shield.envs.options import PLANS, Settings, scheme_of
+from rss_shield.envs.roads.lanes import tightest
 from rss_shield.envs.roads.network import Network
 from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, rare
 from rss_shield.shield.comfort import RIDE
@@ -56,7 +60,9 @@ from rss_shield.shield.tally import end_decision, start_decision
 from rss_shield.shield.verdicts import charges_ego
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
-DECIDE, RESTART, STAY = range(3)  # what an environment does on a call
+# what an environment does on a call; the last two where its kernel is called twice, with a look between
+DECIDE, RESTART, STAY, GO_ON, DONE = range(5)
+NO_ACTION = np.int64(-1)
 _PATIENCE = 6.0  # seconds of silence before the first call explains itself
 
 
@@ -72,10 +78,9 @@ class World(NamedTuple):
     # the rest is as in `Scenario`
     target_speeds: np.ndarray
     labels: np.ndarray
-    features: np.ndarray
-    ranges: np.ndarray
-    connected: np.ndarray
+    sees: View  # `Scenario.view`
     lane_odds: np.ndarray
+    linear: np.ndarray | None  # `[6]` as in `linear_drivers`, where the traffic is of that kind
     field: Field | None  # of the measure of risk, where somebody asked for it
 
 
@@ -97,7 +102,7 @@ class Inputs(NamedTuple):
 
     actions: np.ndarray  # `[E]` discrete actions
     commands: np.ndarray  # `[E, 2]` acceleration [m/s^2] and steering [rad]
-    todo: np.ndarray  # `[E]` DECIDE, RESTART or STAY
+    todo: np.ndarray  # `[E]` DECIDE, RESTART or STAY, overwritten
 
 
 class Outputs(NamedTuple):
@@ -123,11 +128,12 @@ class Film(NamedTuple):
 
 @rare
 def _populate(cars, episode, order, world, sight, flow):
-    config, net = world.config[0], world.network
+    config, net, linear = world.config[0], world.network, world.linear
+    start_habits(cars, linear)
     if flow is None:
-        make_scene(cars, episode, order, net, net.lanes, config, world.target_speeds, world.lane_odds)
+        make_scene(cars, episode, order, net, net.lanes, config, world.target_speeds, world.lane_odds, linear)
     else:
-        open_intersection(cars, episode, order, net, sight, config, flow, world.target_speeds)
+        open_intersection(cars, episode, order, net, sight, config, flow, world.target_speeds, linear)
 
 
 @inner
@@ -135,7 +141,7 @@ def _go_on(cars, episode, order, world, plans, watch, mode, flow):
     """Cars come and go between two decisions."""
     if flow is not None:
         was_ego = episode.ego
-        let_traffic_flow(cars, episode, order, world.network, world.config[0], flow[0])
+        let_traffic_flow(cars, episode, order, world.network, world.config[0], flow[0], world.linear)
         if mode != OFF:
             carry_over(episode, cars, plans.crossings, was_ego, watch)
 
@@ -158,18 +164,7 @@ def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, 
 
 @inner
 def _see(cars, episode, world, sight, out):
-    observe(
-        cars,
-        episode,
-        world.network.lanes,
-        sight,
-        world.config[0],
-        world.features,
-        world.ranges,
-        world.connected,
-        world.target_speeds,
-        out,
-    )
+    observe(cars, episode, world.network, sight, world.sees, world.target_speeds, world.config[0].period, out)
 
 
 @rare
@@ -236,54 +231,65 @@ def _advance(
 
 @kernel
 def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings, mode, penalty, by_change, autoreset):
-    """One decision of the environments `first` to `last` - 1, resets included."""
-    config, lanes = world.config[0], world.network.lanes
+    """One decision of the environments `first` to `last` - 1, resets included.
+
+    Where observations are made apart from it, it waits for that after the decision: the next call goes on from there.
+    """
+    config, lanes, waits = world.config[0], world.network.lanes, world.sees.record[0].kind == NONE
     for e in range(first, last):
+        if inputs.todo[e] == DONE:
+            continue
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
         distances, plans = distances_of(e, world.frames, batch.past), plans_of(e, world.ways, batch.crossings)
         observation, ride, meter = outputs.observations[e], batch.rides[e], meter_of(e, world.field, batch.risks)
-        outputs.rewards[e] = 0.0
-        outputs.terminated[e] = outputs.truncated[e] = False
         if inputs.todo[e] == STAY:
-            survey(cars, episode, world.network, sight, world.flow)
-            _see_apart(cars, episode, world, sight, observation)
+            _start_outputs(e, outputs)
             _report(cars, episode, ride, mode, 0.0, step)
             report_risk(e, meter, outputs.risks)
+            inputs.todo[e] = DONE
             continue
-        if inputs.todo[e] == RESTART or (autoreset == NEXT_STEP and episode.ended):
+        if inputs.todo[e] == RESTART or (inputs.todo[e] == DECIDE and autoreset == NEXT_STEP and episode.ended):
+            _start_outputs(e, outputs)
             _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, mode, step, observation)
             report_risk(e, meter, outputs.risks)
+            inputs.todo[e] = DONE
             continue
-        cost = _advance(
-            e,
-            cars,
-            episode,
-            order,
-            world,
-            sight,
-            distances,
-            plans,
-            ride,
-            meter,
-            watch,
-            settings,
-            mode,
-            inputs,
-            film,
-            step,
-        )
-        _see(cars, episode, world, sight, observation)
-        reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
-        step.raw_reward = reward
-        charged = step.acceleration_changed if by_change else float(step.overridden)
-        reward -= penalty * (charged / max(step.frames, 1))
-        episode.return_ += reward
-        outputs.rewards[e] = reward
-        outputs.terminated[e] = is_terminated(cars, episode, lanes, sight, config)
-        outputs.truncated[e] = is_truncated(episode, config)
-        episode.ended = outputs.terminated[e] or outputs.truncated[e]
-        _report(cars, episode, ride, mode, cost, step)
-        report_risk(e, meter, outputs.risks)
+        if inputs.todo[e] == DECIDE:
+            _start_outputs(e, outputs)
+            cost = _advance(
+                e,
+                cars,
+                episode,
+                order,
+                world,
+                sight,
+                distances,
+                plans,
+                ride,
+                meter,
+                watch,
+                settings,
+                mode,
+                inputs,
+                film,
+                step,
+            )
+            _see(cars, episode, world, sight, observation)
+            reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
+            step.raw_reward = reward
+            charged = step.acceleration_changed if by_change else float(step.overridden)
+            reward -= penalty * (charged / max(step.frames, 1))
+            episode.return_ += reward
+            outputs.rewards[e] = reward
+            outputs.terminated[e] = is_terminated(cars, episode, lanes, sight, config)
+            outputs.truncated[e] = is_truncated(episode, config)
+            episode.ended = outputs.terminated[e] or outputs.truncated[e]
+            _report(cars, episode, ride, mode, cost, step)
+            report_risk(e, meter, outputs.risks)
+            inputs.todo[e] = GO_ON
+            if waits:
+                continue
+        inputs.todo[e] = DONE
         _go_on(cars, episode, order, world, plans, watch, mode, world.flow)
         if episode.ended and autoreset == SAME_STEP:
             for k in range(len(observation)):
@@ -292,6 +298,13 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
             report_risk(e, meter, outputs.final_risks)
             _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, mode, step, observation)
             report_risk(e, meter, outputs.risks)
+            inputs.todo[e] = RESTART
+
+
+@inner
+def _start_outputs(e, outputs):
+    outputs.rewards[e] = 0.0
+    outputs.terminated[e] = outputs.truncated[e] = False
 
 
 class Engine:
@@ -343,14 +356,13 @@ class Engine:
             ways,
             scenario.target_speeds,
             scenario.labels,
-            scenario.features,
-            scenario.ranges,
-            scenario.connected,
+            scenario.view,
             scenario.lane_odds,
+            scenario.linear,
             None if risk is None else compile_field(network, risk, self.settings),
         )
         self.batch = Batch(
-            np.zeros((num_envs, n), CAR),
+            np.zeros((num_envs, n), CAR if scenario.linear is None else LINEAR_CAR),
             np.zeros(num_envs, EPISODE),
             np.zeros((num_envs, n), np.int64),
             past,
@@ -358,16 +370,19 @@ class Engine:
             np.zeros(num_envs, RIDE),
             None if risk is None else np.zeros(num_envs, RISK),
         )
-        self.film = Film(np.full(num_envs, -1, np.int64), np.zeros((0, int(scenario.config["frames"][0]), n), CAR))
+        frames_of_decision = np.zeros((0, int(scenario.config["frames"][0]), n), self.batch.cars.dtype)
+        self.film = Film(np.full(num_envs, -1, np.int64), frames_of_decision)
         self._seen: np.ndarray | None = None  # last observations
-        self._size = int(np.prod(scenario.observation_space.shape or 1))
+        last = scenario.glances[-1] if scenario.glances else None
+        self._size = last.start + last.size if last else int(np.prod(scenario.observation_space.shape or 1))
+        self._looks: list[Callable[..., None] | None] = [None] * len(scenario.glances)  # kernels, compiled likewise
         self._crew = Crew(threads)
         self._kernel: Callable[..., None] | None = None  # `run`, compiled for this engine
         self._foresees: Callable[..., None] | None = None  # `foresee`, likewise
-        config = scenario.config[0]
-        sizes = len(scenario.network.lanes), n, config["speeds"], config["lanes"], config["times"]
-        self._sights = [make_sight(*sizes) for _ in range(threads)]
-        self._watch = make_watch(self.settings.table.rules.heading_bound)
+        grids = [view.record[0] for view in (scenario.view, *(glance.view for glance in scenario.glances))]
+        sizes = len(net.lanes), n, *(max(grid[name] for grid in grids) for name in ("speeds", "lanes", "times"))
+        self._sights = [make_sight(*sizes, scenario.linear) for _ in range(threads)]
+        self._watch = make_watch(self.settings.table.rules.heading_bound, tightest(network))
         self._calm = without_anticipation(self.settings)
         self._desks = [make_desk(n, len(scenario.labels)) for _ in range(threads)]
 
@@ -385,18 +400,17 @@ class Engine:
         """Begin new episodes, in all environments or where `mask` `[E]` says so; the others stand still."""
         e = self.num_envs
         todo = np.full(e, RESTART, np.int8) if mask is None else np.where(mask, RESTART, STAY).astype(np.int8)
-        seen = self._seen
+        seen, stays = self._seen, todo == STAY
         outputs = self._run(Inputs(np.zeros(e, np.int64), np.zeros((e, 2)), todo))
-        if seen is not None:  # traffic may have come and gone since
-            outputs.observations[todo == STAY] = seen[todo == STAY]
+        outputs.observations[stays] = 0.0 if seen is None else seen[stays]
         return outputs
 
     def step(self, actions=None, commands=None) -> Outputs:
         """One decision everywhere.
 
         Args:
-          actions: `[E]` int64 discrete actions, or
-          commands: `[E, 2]` acceleration [m/s^2] and steering [rad].
+          actions: `[E]` int64 meta-actions, or
+          commands: `[E, 2]` acceleration [m/s^2] and steering [rad]; then actions only count in the reward.
         """
         e = self.num_envs
         actions = np.full(e, -1) if actions is None else actions
@@ -436,7 +450,16 @@ class Engine:
         if self._kernel is None:
             self._kernel = _specialise(run, self._sights[0], *common)
         advance = self._kernel
-        self._crew.work(e, lambda thread, first, last: advance(first, last, self._sights[thread], *common))
+
+        def work() -> None:
+            self._crew.work(e, lambda thread, first, last: advance(first, last, self._sights[thread], *common))
+
+        acts = inputs.todo != STAY
+        work()
+        if self.scenario.glances:
+            self._look(acts, outputs.observations)
+            work()
+            self._look(inputs.todo == RESTART, outputs.observations)
         if self.batch.episodes["overflow"].any():
             self.batch.episodes["overflow"] = False
             raise OverflowError(
@@ -445,6 +468,20 @@ class Engine:
             )
         self._seen = outputs.observations
         return outputs
+
+    def _look(self, which: np.ndarray, out: np.ndarray) -> None:
+        """Make the observations that are made apart, of the environments `which` `[E]`, into `out` `[E, size]`."""
+        if not which.any():
+            return
+        for g, glance in enumerate(self.scenario.glances):
+            entry, arguments = call_of(glance, self.world, self.batch, self._sights[0], which, out)
+            look = self._looks[g] = self._looks[g] or _specialise(entry, *arguments)
+
+            def part(thread, first, last, glance=glance, look=look) -> None:
+                _, given = call_of(glance, self.world, self.batch, self._sights[thread], which, out)
+                look(first, last, *given)
+
+            self._crew.work(self.num_envs, part)
 
     def close(self) -> None:
         """Give the threads back."""

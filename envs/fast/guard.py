@@ -42,6 +42,7 @@ from rss_shield.shield.tally import count_change, count_frame, enter_contact, no
 from rss_shield.shield.verdicts import weight_of
 
 OFF, MONITOR, OVERRIDE = range(3)
+_MOST_TURNED = 0.9  # sine of the angle by which a bend may turn a car against its lane
 
 
 class Ways(NamedTuple):
@@ -90,11 +91,12 @@ def no_ways() -> Ways:
     return Ways(no_roads(), np.zeros((1, 0), np.int64))
 
 
-def make_watch(heading_bound):
-    """Tables for a `heading_bound` as in `Rules`."""
+def make_watch(heading_bound, curvature=0.0):
+    """Tables for a `heading_bound` as in `Rules`, and the tightest bend of the roads [1/m]."""
+    bound = max(heading_bound, min(curvature * CAR_LENGTH / 2, _MOST_TURNED))
     boxes = np.zeros((2, 4))
     boxes[0, 0], boxes[0, 1] = CAR_LENGTH, CAR_WIDTH
-    boxes[0, 2], boxes[0, 3] = largest_half_extents(CAR_LENGTH, CAR_WIDTH, heading_bound)
+    boxes[0, 2], boxes[0, 3] = largest_half_extents(CAR_LENGTH, CAR_WIDTH, bound)
     boxes[1, 0], boxes[1, 1] = OBSTACLE_SIZE, OBSTACLE_SIZE
     return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING), MAX_SLIP)
 

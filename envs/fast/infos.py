@@ -6,7 +6,8 @@ nobody asks about.
 
 import numpy as np
 
-from rss_shield.envs.fast.config import EXIT, INTERSECTION, Scenario
+from rss_shield.envs.fast.config import Scenario
+from rss_shield.envs.fast.tasks import EXIT, INTERSECTION
 from rss_shield.envs.options import Settings
 from rss_shield.shield.risk import STATES
 from rss_shield.shield.tally import shield_infos

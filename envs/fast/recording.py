@@ -4,8 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.envs.fast.state import CAR
-
 
 class Log(NamedTuple):
     """All frames of one episode."""
@@ -35,7 +33,7 @@ class Recording:
         frames, n = engine.film.cars.shape[1:]
         engine.film.slots[:] = -1
         engine.film.slots[chosen] = np.arange(len(chosen))
-        engine.film = engine.film._replace(cars=np.zeros((len(chosen), frames, n), CAR))
+        engine.film = engine.film._replace(cars=np.zeros((len(chosen), frames, n), engine.film.cars.dtype))
         self._running = {e: [self._now(e)] for e in chosen}
 
     def running(self, e: int) -> Log:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rss_shield.envs._numpy.floats import wrap_to_pi
 from rss_shield.envs._numpy.ufuncs import arctan2_each
-from rss_shield.envs.fast.state import CAR
+from rss_shield.envs.fast.state import CAR, LINEAR_CAR
 from rss_shield.envs.roads.network import (
     CAR_LENGTH,
     CIRCULAR,
@@ -71,9 +71,10 @@ class Sight(NamedTuple):
     lines: np.ndarray  # `[2]` MARKING
     around: np.ndarray  # `[6]` the nearest of the others
     straight: np.ndarray  # `[1, 11]` a road of one piece
+    linear: np.ndarray | None  # as in `World`
 
 
-def make_sight(n_lanes, n, speeds, lanes, times):
+def make_sight(n_lanes, n, speeds, lanes, times, linear):
     """Fresh working memory."""
     return Sight(
         np.empty((n_lanes, n)),
@@ -95,7 +96,7 @@ def make_sight(n_lanes, n, speeds, lanes, times):
         np.empty((speeds, lanes, times)),
         np.full(n, -1, np.int64),
         np.empty((n, MOMENTS + 2, 3)),
-        np.empty(1, CAR),
+        np.empty(1, CAR if linear is None else LINEAR_CAR),
         np.zeros(n, CAR_ON_ROAD),
         np.zeros(n, SAMPLE),
         np.zeros(_WAYS * n + 64, THREAT),
@@ -107,6 +108,7 @@ def make_sight(n_lanes, n, speeds, lanes, times):
         np.zeros(2, MARKING),
         np.zeros(6, np.int64),
         np.zeros((1, PIECE_FIELDS)),
+        linear,
     )
 
 

@@ -50,6 +50,19 @@ CAR = np.dtype(
     align=True,
 )
 
+# a driver of `LinearVehicle`, with what it weighs
+LINEAR_CAR = np.dtype(
+    [
+        *[(name, CAR.fields[name][0]) for name in CAR.names or ()],
+        ("gain_speed", "f8"),  # [1/s] of how much slower it is than it wants to be
+        ("gain_approach", "f8"),  # [1/s] of how much faster it is than the car ahead
+        ("gain_gap", "f8"),  # [1/s^2] of how much nearer that is than it wants
+        ("gain_turn", "f8"),  # [1/s]
+        ("gain_shift", "f8"),  # [1/s^2]
+    ],
+    align=True,
+)
+
 EPISODE = np.dtype(
     [
         *GENERATOR,

@@ -4,6 +4,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from highway_env.envs.common.action import DiscreteMetaAction
@@ -14,6 +15,8 @@ from rss_shield.envs.decisions.replacement import order_of, replace
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
 from rss_shield.envs.fast.infos import step_infos
+from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
+from rss_shield.envs.fast.pictures import Painter
 from rss_shield.envs.fast.recording import Recording
 from rss_shield.envs.options import Settings
 from rss_shield.shield.risk import RiskSettings
@@ -60,9 +63,10 @@ class FastVectorEnv(VectorEnv):
       threads: threads that share the work. Results do not depend on it.
       replaces: a meta-action whose mask is False is replaced at the start of the decision; see `ShieldWrapper`.
       risk: settings of the driving safety field that is measured around each ego, too; None = not measured.
+      render_mode: "rgb_array", or None: nobody looks.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": [*RENDER_MODES], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
 
     def __init__(
         self,
@@ -75,9 +79,12 @@ class FastVectorEnv(VectorEnv):
         penalty_by_change: bool = False,
         replaces: bool = False,
         risk: RiskSettings | None = None,
+        render_mode: str | None = None,
     ) -> None:
         self.scenario = scenario
         self.settings = settings
+        self.render_mode = render_mode
+        self._painter: Painter | None = None
         self.num_envs = num_envs
         self.single_observation_space = scenario.observation_space
         self.single_action_space = scenario.action_space
@@ -163,8 +170,28 @@ class FastVectorEnv(VectorEnv):
         info = info_at(self._infos, e)
         return info if self._decided[e] else _without(info, _OF_DECISIONS)
 
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Pictures of all environments, as `picture` makes them; None if `render_mode` is."""
+        if self.render_mode is None:
+            return None
+        return tuple(self.picture(e) for e in range(self.num_envs))
+
+    def picture(self, e: int) -> np.ndarray:
+        """Environment `e` as highway-env draws it, `[H, W, 3]` uint8. The engine's state is only read.
+
+        Raises:
+          ValueError: there is no such environment.
+        """
+        if not 0 <= e < self.num_envs:
+            raise ValueError(f"e = {e!r}: expected a whole number from 0 to {self.num_envs - 1}")
+        if self._painter is None:
+            self._painter = Painter(self.scenario)
+        return self._painter.paint(self.engine.batch.cars[e], self.engine.batch.episodes[e])
+
     def close_extras(self, **kwargs) -> None:
         self.engine.close()
+        if self._painter is not None:
+            self._painter.close()
 
     def _finals(self, outputs: Outputs, ended, actions, proposed) -> dict:
         finals = self._told(outputs.final_steps, outputs.final_risks, ended, actions, proposed)
@@ -219,18 +246,33 @@ class FastVectorEnv(VectorEnv):
         if actions.ndim == 0 or len(actions) != self.num_envs:
             given = f"actions = {actions}" if actions.ndim == 0 else f"{len(actions)} actions given"
             raise ValueError(f"{given}; expected {self.num_envs}")
-        count = len(self.scenario.labels)
+        choices = self.scenario.choices
+        count = len(self.scenario.labels) if choices is None else len(choices)
         if count:
             if not np.issubdtype(actions.dtype, np.integer) or actions.min() < 0 or actions.max() >= count:
                 raise ValueError(f"actions = {actions}: expected integers from 0 to {count - 1}")
-            return actions.astype(np.int64), None
+            return actions.astype(np.int64), None if choices is None else choices[actions]
         numbers = np.issubdtype(actions.dtype, np.number) and np.isfinite(actions).all()
         if actions.shape != self.action_space.shape or not numbers:
             raise ValueError(f"actions = {actions}: expected finite numbers, shape {self.action_space.shape}")
-        return None, self.scenario.commands(actions)
+        return _compared(actions), self.scenario.commands(actions)
 
-    def _shaped(self, observations: np.ndarray) -> np.ndarray:
-        return observations.reshape(self.observation_space.shape)
+    def _shaped(self, observations: np.ndarray) -> Any:
+        """Observations `[E, size]` as the space has them."""
+        space, glances = self.observation_space, self.scenario.glances
+        if not isinstance(space, spaces.Tuple):
+            return observations.reshape(space.shape).astype(space.dtype, copy=False)
+        columns = [observations[:, one.start : one.start + one.size] for one in glances]
+        return tuple(
+            seen.reshape(part.shape).astype(part.dtype) for seen, part in zip(columns, space.spaces, strict=True)
+        )
+
+
+def _compared(actions: np.ndarray) -> np.ndarray:
+    """Numbers `[E, A]` as highway-env compares them with its lane changes, 0 and 2, when it rewards; -1 = neither."""
+    if actions.shape[1] > 1:
+        return np.full(len(actions), -1)
+    return np.where(np.isin(actions[:, 0], (0, 2)), actions[:, 0], -1).astype(np.int64)
 
 
 def _rows(actions: np.ndarray) -> np.ndarray:

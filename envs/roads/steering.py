@@ -11,8 +11,8 @@ from rss_shield.shield._numba.compiled import inner
 PURSUIT = ControlledVehicle.TAU_PURSUIT  # [s]
 _KP_HEADING = ControlledVehicle.KP_HEADING  # [1/s]
 _KP_LATERAL = ControlledVehicle.KP_LATERAL
-_MAX_STEERING = ControlledVehicle.MAX_STEERING_ANGLE  # [rad]
-MAX_SLIP = float(np.arctan(np.tan(_MAX_STEERING) / 2))  # of a car's centre [rad]
+MAX_STEERING = ControlledVehicle.MAX_STEERING_ANGLE  # [rad]
+MAX_SLIP = float(np.arctan(np.tan(MAX_STEERING) / 2))  # of a car's centre [rad]
 
 
 @inner
@@ -40,7 +40,7 @@ def steering_angle(lane, s, lateral, heading, speed, length):
         return 0.0
     course = arcsin(_sine_back(lateral, speed))
     slip = arcsin(_sine_of_slip(lane, s, heading, speed, length, course))
-    return clip(steering_for(slip), -_MAX_STEERING, _MAX_STEERING)
+    return clip(steering_for(slip), -MAX_STEERING, MAX_STEERING)
 
 
 @inner
@@ -68,7 +68,7 @@ def steer(cars, count, lanes, sight):
         y[b] = 2 * x[b]
     arctan_each(y, x, count)
     for b in range(count):
-        cars[some[b]].steering = clip(x[b], -_MAX_STEERING, _MAX_STEERING)
+        cars[some[b]].steering = clip(x[b], -MAX_STEERING, MAX_STEERING)
 
 
 @inner

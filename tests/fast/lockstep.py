@@ -11,6 +11,7 @@ from rss_shield.envs.fast.draws import generator_state
 from rss_shield.envs.fast.engine import DISABLED, Engine
 from rss_shield.envs.fast.infos import step_infos
 from rss_shield.envs.fast.state import OBSTACLE, TRAFFIC
+from rss_shield.envs.fast.vector import _compared
 from rss_shield.envs.stock import drivers_unchanged
 from rss_shield.shield.tally import info_at
 
@@ -38,7 +39,7 @@ def actions_of(policy: str, space, rng):
         action = rng.uniform(-1, 1, space.shape) * (0.1 if policy != "random" else 1.0)
         action[0] = throttle
         return action.astype(np.float32)
-    names = {"faster": {5: 3, 3: 2}, "slower": {5: 4, 3: 0}}
+    names = {"faster": {5: 3, 3: 2, 9: 7}, "slower": {5: 4, 3: 0, 9: 1}}  # of `DiscreteAction`, straight on
     return int(rng.integers(space.n)) if policy == "random" else names[policy][int(space.n)]
 
 
@@ -103,7 +104,9 @@ def engine_inputs(engine, action):
     scenario = engine.scenario
     if len(scenario.labels):
         return np.array([action]), None
-    return None, scenario.commands(np.asarray(action)[None])
+    if scenario.choices is not None:
+        return np.array([action]), scenario.choices[[action]]
+    return _compared(np.asarray(action)[None]), scenario.commands(np.asarray(action)[None])
 
 
 def _compare_state(env, engine, where, worst, discrete) -> None:
@@ -154,7 +157,10 @@ def _steps(engine, car):
 
 
 def _compare_observation(seen, out, worst) -> None:
+    if isinstance(seen, tuple):
+        seen = np.concatenate([part.ravel() for part in seen])
     ours = out.observations[0].reshape(seen.shape)
+    seen = seen.astype(np.float32)
     spacing = np.spacing(np.maximum(np.abs(seen), np.float32(1e-7)))
     worst["ulps"] = max(worst["ulps"], int(np.ceil(np.max(np.abs(seen - ours) / spacing))))
 

@@ -130,10 +130,7 @@ def test_infos_of_one_environment_are_plain_values():
     [
         ("parking-v0", None, "parking-v0"),
         (ENV, {"controlled_vehicles": 2}, "controlled_vehicles"),
-        (ENV, {"other_vehicles_type": "highway_env.vehicle.behavior.LinearVehicle"}, "LinearVehicle"),
-        (ENV, {"observation": {"type": "OccupancyGrid"}}, "OccupancyGrid"),
-        (ENV, {"observation": {"type": "Kinematics", "features": ["x", "cos_d"]}}, "cos_d"),
-        (ENV, {"observation": {"type": "Kinematics", "order": "shuffled"}}, "shuffled"),
+        (ENV, {"observation": {"type": "Kinematics", "vehicles_count": 1}}, "vehicles_count = 1"),
         (ENV, {"action": {"type": "ContinuousAction", "dynamical": True}}, "dynamical"),
         ("merge-v0", {"action": {"type": "ContinuousAction"}}, "ContinuousAction"),
     ],

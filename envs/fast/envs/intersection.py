@@ -1,23 +1,89 @@
-"""Traffic that comes and goes at an intersection, with the random numbers drawn in highway-env's order."""
+"""`intersection-v0/-v2`: four arms, traffic that comes and goes, and yields; random numbers in highway-env's order."""
+
+from typing import Any
 
 import numpy as np
 
-from rss_shield.envs._numpy.floats import norm
-from rss_shield.envs.fast.draws import integers, normal, random, two_of, uniform
+from rss_shield.envs._numpy.floats import clip, norm
+from rss_shield.envs.fast.draws import integers, normal, random, two_of
 from rss_shield.envs.fast.frame import act, look_around, survey, think
-from rss_shield.envs.fast.scenes import add_ego, add_on_lane
+from rss_shield.envs.fast.linear_drivers import randomize
+from rss_shield.envs.fast.rating import normalized, scaled, weigh
+from rss_shield.envs.fast.record import FLOW, Unsupported, set_weights
 from rss_shield.envs.fast.sight import sort_along_x
+from rss_shield.envs.fast.spawning import add_ego, add_on_lane
 from rss_shield.envs.roads.network import heading_at, local_coordinates, position
-from rss_shield.shield._numba.compiled import part
+from rss_shield.envs.stock import AT_INTERSECTIONS
+from rss_shield.shield._numba.compiled import inner, part
 
+REWARDS = ("collision_reward", "high_speed_reward", "arrived_reward", "on_road_reward")
+DESTINATIONS = ("o0", "o1", "o2", "o3")  # the arms
+# Room at an intersection, at most. Behind an ego that stands still for 150 s, with a new car tried every
+# second, the fullest of 256 environments held 58.
+MOST_CARS = 64
+_EXIT_DISTANCE = 25.0  # beyond an intersection [m]
 _CLEARANCE = 15.0  # of a new car to all others [m]
 _EGO_CLEARANCE = 20.0  # others are removed within it [m]
 _ANYWHERE, _STRAIGHT_ON = np.int64(0), np.int64(1)  # where cars are bound for
 _LEAVING = 20.0  # cars vanish that far before the end of the world [m]
 
 
+def describe(record: Any, given: dict, env: Any, number: dict) -> None:
+    """Enter a configuration; `number` is that of each lane of `env`."""
+    for name, value in AT_INTERSECTIONS.items():
+        record[name.lower()] = value
+    record["main_lane"] = number["o0", "ir0", 0]
+    record["traffic"] = given["initial_vehicle_count"]
+    record["offroad_terminal"] = given["offroad_terminal"]
+    record["normalize_reward"] = given["normalize_reward"]
+    record["reward_low"], record["reward_high"] = given["collision_reward"], given["arrived_reward"]
+    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    set_weights(record, given, REWARDS)
+
+
+def flow_of(dt: float, given: dict, env: Any, number: dict) -> np.ndarray:
+    """How traffic comes, goes and yields, `[1]` FLOW; frames of `dt` [s]."""
+    flow = np.zeros(1, FLOW)
+    entries = [number[f"o{k}", f"ir{k}", 0] for k in range(4)]
+    flow["arm"] = entries[1] - entries[0]
+    assert entries == list(range(entries[0], entries[3] + 1, entries[1] - entries[0]))
+    asked = given["destination"]
+    if asked and asked not in DESTINATIONS:
+        raise Unsupported(f"destination = {asked!r}", f"None or one of {', '.join(DESTINATIONS)}")
+    flow["destination"] = DESTINATIONS.index(asked) if asked else -1
+    flow["warm_up_frames"] = 3 * given["simulation_frequency"]
+    flow["regulation_period"] = int(1 / dt / env.road.REGULATION_FREQUENCY)
+    flow["spawn_probability"] = given["spawn_probability"]
+    return flow
+
+
+def room_for(record: Any, given: dict) -> int:
+    """As many road users as can appear in an episode, at most `MOST_CARS`."""
+    decisions = record["duration"][0] / record["period"][0] + 2
+    return int(min(MOST_CARS, max(given["initial_vehicle_count"], 1) + 1 + np.ceil(decisions)))
+
+
+@inner
+def has_arrived(cars, i, lanes, sight):
+    """Has a car left the intersection?"""
+    k = cars[i].lane
+    return lanes[k].exits and sight.s[k, i] >= _EXIT_DISTANCE
+
+
+@inner
+def rate(cars, episode, ego, on_road, lanes, sight, config, step):
+    """Arguments as in `tasks.rate`."""
+    arrived = has_arrived(cars, episode.ego, lanes, sight)
+    step.success = arrived
+    step.reward_1 = clip(scaled(ego.speed, config), 0.0, 1.0)
+    step.reward_2 = 1.0 if arrived else 0.0
+    step.reward_3 = on_road
+    reward = config.weight_2 if arrived else weigh(step, config)
+    return normalized(reward * on_road, config)
+
+
 @part
-def open_intersection(cars, episode, order, net, sight, config, flow, target_speeds):
+def open_intersection(cars, episode, order, net, sight, config, flow, target_speeds, linear):
     """Populate the roads, let the traffic run for three seconds, then add the ego.
 
     Args:
@@ -29,6 +95,7 @@ def open_intersection(cars, episode, order, net, sight, config, flow, target_spe
       config: CONFIG.
       flow: `[1]` FLOW.
       target_speeds: `[K]` of meta-actions [m/s].
+      linear: of the `Scenario`.
     """
     lanes = net.lanes
     episode.ego = episode.cars = episode.vehicles = episode.road_frames = 0
@@ -36,21 +103,21 @@ def open_intersection(cars, episode, order, net, sight, config, flow, target_spe
         cars[i].length = 0.0
     n = config.traffic
     for t in range(n - 1):
-        _arrive(cars, episode, t * (80.0 / (n - 1)), 1.0, 1.0, 0.6, _ANYWHERE, net, config, flow[0])
+        _arrive(cars, episode, t * (80.0 / (n - 1)), 1.0, 1.0, 0.6, _ANYWHERE, net, config, flow[0], linear)
     _renumber(cars, episode, order)
     survey(cars, episode, net, sight, flow)
     for _ in range(flow[0].warm_up_frames):
         changing = look_around(cars, episode, order, net, sight, flow)
         think(cars, episode, 0, episode.vehicles, changing, net, sight, config)
         act(cars, episode, order, net, sight, config, flow)
-    _arrive(cars, episode, 60.0, 0.1, 0.0, 1.0, _STRAIGHT_ON, net, config, flow[0])
+    _arrive(cars, episode, 60.0, 0.1, 0.0, 1.0, _STRAIGHT_ON, net, config, flow[0], linear)
     _add_ego_on_its_way(cars, episode, net, config, flow[0], target_speeds)
     _renumber(cars, episode, order)
     episode.observed_lanes = lanes[cars[episode.ego].lane].siblings
 
 
 @part
-def let_traffic_flow(cars, episode, order, net, config, flow):
+def let_traffic_flow(cars, episode, order, net, config, flow, linear):
     """After each decision: cars that leave are gone, and a new one may come."""
     for i in range(len(cars)):
         cars[i].was = i if i < episode.cars else -1
@@ -61,7 +128,7 @@ def let_traffic_flow(cars, episode, order, net, config, flow):
             _remove(cars, episode, i)
         else:
             i += 1
-    _arrive(cars, episode, 0.0, 1.0, 1.0, flow.spawn_probability, _ANYWHERE, net, config, flow)
+    _arrive(cars, episode, 0.0, 1.0, 1.0, flow.spawn_probability, _ANYWHERE, net, config, flow, linear)
     _renumber(cars, episode, order)
 
 
@@ -72,7 +139,7 @@ def _arc_length(lane, car):
 
 
 @part
-def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, net, config, flow):
+def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, net, config, flow, linear):
     """Perhaps put a new car on one of the entries, around arc length `s` [m], bound for another arm."""
     if random(episode) > probability:
         return
@@ -91,7 +158,7 @@ def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, ne
     i = add_on_lane(cars, episode, lane, s, speed, net.lanes, config)
     cars[i].was = -1
     cars[i].route = net.plans[cars[i].lane, destination]
-    cars[i].delta = uniform(episode, config.delta_low, config.delta_high)
+    randomize(cars, episode, i, config, linear)
 
 
 @part
