@@ -15,6 +15,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.fast.state import REWARDS
+from rss_shield.envs.roads.hostile import NO_VICE, vice_of
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network, compile_network
 from rss_shield.envs.stock import AT_INTERSECTIONS, drivers_unchanged, make_stock
 
@@ -48,6 +49,8 @@ CONFIG = np.dtype(
         ("delta", "f8"),
         ("delta_low", "f8"),
         ("delta_high", "f8"),
+        ("vice", "i8"),  # of everybody, see `envs.roads.hostile`
+        ("bounded", "?"),  # in which they keep to the table's limits
         # scene
         ("traffic", "i8"),  # vehicles besides the ego
         ("traffic_checks", "?"),  # they look for collisions themselves
@@ -202,6 +205,7 @@ def compile_scenario(
     record["max_steps"] = (wrapped.spec and wrapped.spec.max_episode_steps) or 0
     record["duration"] = given.get("duration", np.inf)
     _fill_traffic(record)
+    record["vice"], record["bounded"] = vice_of(given["other_vehicles_type"]) or (NO_VICE, False)
     target_speeds, labels = _fill_action(record, env.action_type)
     features, ranges, connected = _fill_observation(record, env)
     number = {index: i for i, index in enumerate(env.road.network.lanes_dict())}
@@ -239,8 +243,8 @@ def compile_scenario(
 
 def _check(given: dict) -> None:
     idm = "highway_env.vehicle.behavior.IDMVehicle"
-    if given["other_vehicles_type"] != idm:
-        raise Unsupported(f"other_vehicles_type = {given['other_vehicles_type']!r}", repr(idm))
+    if given["other_vehicles_type"] != idm and vice_of(given["other_vehicles_type"]) is None:
+        raise Unsupported(f"other_vehicles_type = {given['other_vehicles_type']!r}", f"{idm!r} or one of HOSTILE")
     if (IDMVehicle.LENGTH, IDMVehicle.WIDTH) != (CAR_LENGTH, CAR_WIDTH):
         raise Unsupported(
             f"vehicles of {IDMVehicle.LENGTH:g} m x {IDMVehicle.WIDTH:g} m", f"{CAR_LENGTH:g} m x {CAR_WIDTH:g} m"

@@ -3,11 +3,13 @@
 import numpy as np
 from highway_env.road.lane import AbstractLane
 from highway_env.road.regulation import RegulatedRoad
+from highway_env.utils import class_from_path
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.fast.draws import generator_state, load_generator
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
+from rss_shield.envs.roads.hostile import NO_VICE
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network
 
 
@@ -48,7 +50,9 @@ def _vehicle(env, car, indices, network: Network):
     """One highway-env vehicle."""
     pose = (env.road, [car["x"], car["y"]], float(car["heading"]), float(car["speed"]))
     if car["kind"] == TRAFFIC:
-        vehicle = IDMVehicle(*pose)
+        vehicle = class_from_path(env.config["other_vehicles_type"])(*pose)
+        if car["vice"] != NO_VICE:
+            vehicle.vice, vehicle.heading = int(car["vice"]), float(car["heading"])
         vehicle.timer, vehicle.DELTA = float(car["timer"]), float(car["delta"])
         vehicle.enable_lane_change = bool(car["changes_lane"])
         if car["yields"]:
@@ -145,6 +149,7 @@ def _read_user(car, user, numbers, network: Network) -> None:
         car["kind"] = TRAFFIC
         car["timer"], car["delta"], car["changes_lane"] = user.timer, user.DELTA, user.enable_lane_change
         car["yields"] = getattr(user, "is_yielding", False)
+        car["vice"] = getattr(user, "vice", NO_VICE)
 
 
 def _find_route(route, numbers, network: Network) -> tuple[int, int]:

@@ -40,6 +40,7 @@ CAR = np.dtype(
         ("speed_index", "i8"),  # among the target speeds, of a META car
         ("route", "i8"),  # row of the route tables, -1 = none
         ("route_step", "i8"),  # steps of the route that lie behind
+        ("vice", "i8"),  # of a hostile driver, see `envs.roads.hostile`
         ("crashed", "?"),
         ("hit", "?"),  # an impact is due
         ("checks", "?"),  # looks for collisions itself
