@@ -57,8 +57,8 @@ def make_vec(
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
       kwargs: `max_episode_steps`; `rules`, `intervention_penalty`, `penalty_on`, `entry`, `intent`, `waiting`,
-        `examine`, `filter`, `filter_at`, `correction`, `replace` and `risk` of `ShieldWrapper`; and whatever else
-        `make` takes (`judge_params`, ...) where the backend is "highway-env".
+        `examine`, `filter`, `filter_at`, `correction`, `evasion`, `replace` and `risk` of `ShieldWrapper`; and
+        whatever else `make` takes (`judge_params`, ...) where the backend is "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.

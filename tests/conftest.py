@@ -19,6 +19,7 @@ SLOW = frozenset(
         "envs/test_bends",
         "envs/test_compliant_traffic",
         "envs/test_egos",
+        "envs/test_evasion",
         "envs/test_free_steering",
         "envs/test_hostile",
         "envs/test_judge",

@@ -9,6 +9,7 @@ from rss_shield.eval.files import write_text
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.pictures import draw
 from rss_shield.eval.suite.scenarios.catalogue import SCENARIOS
+from rss_shield.eval.suite.scenarios.r157_page import write_r157
 from rss_shield.eval.suite.scenarios.stage import LITERAL, Result, Scenario, play
 from rss_shield.shield.trace import save
 from rss_shield.shield.verdicts import AT_FAULT
@@ -17,11 +18,13 @@ EARLIER, LATER = 0.3, 0.11  # danger may be seen so much before and after the ti
 
 
 class Outcome(NamedTuple):
-    """One scenario, played without the shield, with it, and by the letter of Def. 10 where that is another thing."""
+    """One scenario, played without the shield, with it, with evasion besides, and by the letter of Def. 10 where that
+    is another thing."""
 
     scenario: Scenario
     off: Result
     on: Result
+    evading: Result
     literal: Result | None
     differences: tuple[str, ...]  # from what is derived; none is as it should be
 
@@ -29,21 +32,23 @@ class Outcome(NamedTuple):
 def outcome_of(scenario: Scenario) -> Outcome:
     """Play a scenario and compare it with what its author has worked out."""
     off, on = play(scenario, False), play(scenario, True)
+    evading = play(scenario, True, evasion=True)
     literal = play(scenario, True, LITERAL) if scenario.literal is not None else None
     wrong = []
     for name, found, expected in (
         ("verdict without the shield", off.verdict, scenario.off),
         ("verdict with the shield", on.verdict, scenario.on),
+        ("verdict with evasion", evading.verdict, scenario.evading),
         ("verdict by the letter", literal.verdict if literal else None, scenario.literal),
         ("axis", off.axis, scenario.axis),
         ("response", off.response, scenario.response),
-        ("duties broken with the shield", on.broken, 0),
+        ("duties broken with the shield", on.broken + evading.broken, 0),
     ):
         if found != expected:
             wrong.append(f"{name}: {found!r}, derived {expected!r}")
     if not _is_near(off.danger, scenario.danger):
         wrong.append(f"danger: {off.danger} s, derived {scenario.danger} s")
-    return Outcome(scenario, off, on, literal, tuple(wrong))
+    return Outcome(scenario, off, on, evading, literal, tuple(wrong))
 
 
 def _is_near(found: float | None, derived: float | None) -> bool:
@@ -57,7 +62,9 @@ def page_of(outcomes: list[Outcome]) -> str:
     as_derived = sum(not one.differences for one in outcomes)
     contacts = [one for one in outcomes if one.off.verdict]
     left = [one for one in outcomes if one.on.verdict]
-    at_fault = sum(one.on.verdict in AT_FAULT for one in outcomes)
+    touched = [one for one in outcomes if one.evading.verdict]
+    new = sum(not one.on.verdict for one in touched)
+    at_fault = sum(result.verdict in AT_FAULT for one in outcomes for result in (one.on, one.evading))
     lines = [
         "# Scenarios",
         "",
@@ -66,7 +73,9 @@ def page_of(outcomes: list[Outcome]) -> str:
         "what comes out.",
         "",
         f"{as_derived} of {len(outcomes)} come out as derived. Without the shield {len(contacts)} end in a contact, "
-        f"with it {len(left)}, of which {at_fault} are the ego's fault. Nothing is drawn at random, so there is no "
+        f"with it {len(left)}, with evasive effort (`evasion=True`) {len(touched)}, {new} of them new; {at_fault} of "
+        f"these "
+        "are the ego's fault. Nothing is drawn at random, so there is no "
         "interval: every scenario is played once and is the same each time.",
         "",
         "*Danger*: as derived, then as seen on frames of 0.1 s; up to 0.3 s earlier is as derived, for what "
@@ -74,8 +83,9 @@ def page_of(outcomes: list[Outcome]) -> str:
         "without the duty to brake for whoever has cut in (hole H6), where that is played. Verdicts are from the "
         "ego's view, by the full table in every column.",
         "",
-        "| situation | kind | danger [s] | axis | response | off | on | Def. 10 | speed taken off [m/s] |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| situation | kind | danger [s] | axis | response | off | on | on + evasion | Def. 10 | speed taken off "
+        "[m/s] |",
+        "|---" * 10 + "|",
     ]
     for one in outcomes:
         s = one.scenario
@@ -89,7 +99,7 @@ def page_of(outcomes: list[Outcome]) -> str:
         cells = (
             s.name + (" **differs**" if one.differences else ""),
             *(s.kind, danger, one.off.axis or "-", one.off.response or "-"),
-            *(one.off.verdict or "no contact", one.on.verdict or "no contact"),
+            *(result.verdict or "no contact" for result in (one.off, one.on, one.evading)),
             (one.literal.verdict or "no contact") if one.literal else "",
             f"{max(one.on.speed_lost, 0.0):.1f}",
         )
@@ -108,7 +118,11 @@ def run(arguments: list[str] | None = None) -> None:
     parser.add_argument("names", nargs="*", help="those whose names contain one of these; none = all")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write scenarios.md there; of all scenarios only")
     parser.add_argument("--traces", type=Path, metavar="FOLDER", help="write trace and picture of each run there")
+    parser.add_argument("--r157", type=Path, metavar="FOLDER", help="write only r157.md there: UN R157's situations")
     options = parser.parse_args(arguments)
+    if options.r157 is not None:
+        write_r157(options.r157)
+        return
     chosen = [s for s in SCENARIOS if not options.names or any(name in s.name for name in options.names)]
     if not chosen:
         sys.exit(
@@ -133,7 +147,12 @@ def run(arguments: list[str] | None = None) -> None:
 def _keep(outcome: Outcome, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     stem = "_".join("".join(c if c.isalnum() else " " for c in outcome.scenario.name).split())
-    for mode, result in (("off", outcome.off), ("on", outcome.on), ("literal", outcome.literal)):
+    for mode, result in (
+        ("off", outcome.off),
+        ("on", outcome.on),
+        ("evading", outcome.evading),
+        ("literal", outcome.literal),
+    ):
         if result is None:
             continue
         save(result.trace, folder / f"{stem}_{mode}.npz")
