@@ -1,13 +1,13 @@
 """PPO against the shield: an agent that is paid for contacts that are the ego's fault, and for nothing else.
 
     python bench/adversary.py                         trains what is not there yet, in the compiled engine
-    python bench/adversary.py --write                 ... and writes docs/results/adversary.md and its picture
+    python bench/adversary.py --write                 writes docs/results/adversary.md and its picture of what is there
     python bench/adversary.py --only whole            against one of the shields
 
 It drives the ego, with throttle and wheels, against the whole shield and against shields without one of its conditions
 each. Every contact is judged afterwards by the whole table (`rss-shield judge`), not by the rules that are left, and
 the first one at fault is kept as a trace. A small reward for small margins shows the way. One training is one file in
-runs/adversary, and is not repeated.
+runs/adversary, written as it goes on; one that is whole is not repeated.
 """
 
 import dataclasses
@@ -108,8 +108,8 @@ class Paid(VectorEnvAdapter):
         return fault
 
 
-def train(name: str, config: Config, path: Path) -> dict[str, Any]:
-    """One adversary; returns its curve: decisions, episodes, contacts and faults until then, after each rollout."""
+def train(name: str, config: Config, path: Path) -> None:
+    """One adversary; keeps its curve: decisions, episodes, contacts and faults until then, after each rollout."""
     changes = SHIELDS[name]
     rules = Rules(**changes)._replace(anticipation=0.0) if changes else Rules()
     paid = Paid(make_vec(ENV_ID, ENVS, config=CONFIG, rules=rules), path.with_suffix(".npz"))
@@ -130,10 +130,9 @@ def train(name: str, config: Config, path: Path) -> dict[str, Any]:
     while model.num_timesteps < total:
         model.learn(ENVS * STEPS, reset_num_timesteps=False)
         curve.append([model.num_timesteps, paid.episodes, paid.contacts, paid.faults])
-        if model.num_timesteps % (20 * ENVS * STEPS) == 0:
-            print(name, curve[-1], flush=True)
+        write_json(path, {"name": name, "changes": changes, "seed": config.seed, "total": total, "curve": curve})
+        print(name, curve[-1], flush=True)
     paid.close()
-    return {"name": name, "changes": changes, "seed": config.seed, "curve": curve}
 
 
 def page_of(results: list[dict[str, Any]]) -> str:
@@ -184,15 +183,23 @@ def draw(results: list[dict[str, Any]], path: Path) -> None:
     plt.close(figure)
 
 
+def _is_whole(path: Path) -> bool:
+    """Is a training there, and finished?"""
+    if not path.exists():
+        return False
+    found = json.loads(path.read_text(encoding="utf-8"))
+    return found["curve"][-1][0] >= found["total"]
+
+
 def main(config: Config) -> None:
-    """Train what is missing, and say or write what came of it."""
+    """Train what is missing, or write what is there."""
     torch.set_num_threads(1)
     config.out.mkdir(parents=True, exist_ok=True)
     results = []
     for k, name in enumerate(SHIELDS):
         path = config.out / f"{k}_seed{config.seed}_{config.decisions if not k else config.weakened}.json"
-        if not path.exists() and name.startswith(config.only):
-            write_json(path, train(name, config, path))
+        if not config.write and name.startswith(config.only) and not _is_whole(path):
+            train(name, config, path)
         if path.exists():
             results.append(json.loads(path.read_text(encoding="utf-8")))
     if config.write:

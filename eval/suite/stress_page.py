@@ -84,7 +84,7 @@ def _sum(results: list[Result]) -> Result:
     total: Result = {name: sum(one[name] for one in results) for name in _ADDED}
     total["verdicts"] = {name: sum(one["verdicts"][name] for one in results) for name in (*VERDICTS, NO_CONTACT)}
     for name in ("min_ttc", "worst_margin"):
-        total[name] = min(one[name] for one in results)
+        total[name] = min(float(one[name]) for one in results)  # JSON has texts for what is infinite
     return total
 
 

@@ -80,9 +80,9 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
     """Def. 13: a manoeuvre out of the family, if one is owed and there is one.
 
     It is owed in danger with somebody who has broken its duty, or who is hit, as predicted naively, although the ego
-    keeps its basic response. Among the manoeuvres that touch nobody the first that ends out of danger counts, else the
-    one that stays farthest from whoever is in danger with the ego. Once it has moved over, the ego goes straight on
-    until the danger is over.
+    keeps its basic response; unless that response is such a manoeuvre itself. Among those that touch nobody the first
+    that ends out of danger counts; where somebody would be hit else, the one that stays farthest from whoever is in
+    danger with the ego. Once it has moved over, the ego goes straight on until the danger is over.
 
     Args:
       wish: `Command` of the ego's driver.
@@ -97,7 +97,7 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
     Returns:
       `Effort`.
     """
-    dangerous, offenders = _offenders(ego, users, memory, table, who)
+    dangerous, offenders, urgent = _offenders(ego, users, memory, table, who)
     if not dangerous:
         return Effort(wish, False, False)
     if offenders != 0:
@@ -112,7 +112,7 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
             if ends:
                 best = k
                 break
-            if separation > widest + 1e-3:
+            if urgent and separation > widest + 1e-3:
                 best, widest = k, separation
         if best >= 0:
             return Effort(_command(manoeuvre(best, table.ego), ego, body, bounds, table), True, True)
@@ -125,8 +125,8 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
 
 @inner
 def _offenders(ego, users, memory, table, who):
-    """(is there danger, set of bits: who makes an evasion owed), by place in `who`."""
-    me, dangerous, offenders = _motion_of_ego(ego), False, 0
+    """(is there danger, set of bits: who makes an evasion owed, is one of them hit else), by place in `who`."""
+    me, dangerous, offenders, urgent = _motion_of_ego(ego), False, 0, False
     for a in range(min(how_many(who, users), _MOST_AT_ONCE)):
         i = which(who, a)
         if memory[i].since == 0:
@@ -136,9 +136,11 @@ def _offenders(ego, users, memory, table, who):
         braking = table.ego.a_min_brake if owes_braking(memory[i], table.rules) != 0 else 0.0
         basic = Plan(-braking, 0.0, 0.0)
         collides = smallest_separation(me, basic, other, HORIZON, STEP) < 0.0
-        if must_evade(True, memory[i].other_broke == KEPT, collides, True):
+        enough = not collides and ends_safely(me, basic, other, table.ego, table.other, HORIZON)
+        if must_evade(True, memory[i].other_broke == KEPT, collides, not enough):
             offenders |= 1 << a
-    return dangerous, offenders
+            urgent = urgent or collides
+    return dangerous, offenders, urgent
 
 
 @inner

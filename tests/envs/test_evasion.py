@@ -28,7 +28,7 @@ def test_on_other_common_roads_too():
         config = {"other_vehicles_type": HOSTILE["mixed"]}
         found = compare(env_id, range(2), "random", config=config, shield="override", evasion=True, max_steps=12)
         assert found.discrete == []
-        assert found.equal == found.episodes
+        assert found.close == found.episodes
 
 
 def test_it_avoids_contacts_and_is_never_to_blame():

@@ -48,11 +48,14 @@ def test_without_danger_the_drivers_wish_stays():
     assert effort([(user(30.0, 0.0, 10.0), remembered(0))]) == (WISH, False, False)
 
 
-def test_an_offender_that_is_missed_by_braking_gently_is_answered_so():
+def test_where_the_basic_response_is_enough_the_drivers_wish_stays():
     # 25 m behind who brakes with 1 m/s^2: 20 m/s are gone in 4 s with 5 m/s^2, after 40 m; the other is 72 m on by then
-    wish, evading, changed = effort([(user(30.0, 0.0, 20.0), remembered(3, TOO_SHORT, -1.0))])
+    assert effort([(user(30.0, 0.0, 20.0), remembered(3, TOO_SHORT, -1.0))]) == (WISH, False, False)
+    # with 10 m/s^2 it stops after 20 m: 45 m are enough for 5 m/s^2 (40 m), 38 m only for more
+    assert not effort([(user(30.0, 0.0, 20.0), remembered(3, TOO_SHORT, -10.0))]).changed
+    wish, evading, changed = effort([(user(23.0, 0.0, 20.0), remembered(3, TOO_SHORT, -10.0))])
     assert evading and changed
-    assert wish == pytest.approx((-5.0, 0.0))
+    assert wish == pytest.approx((-5.5, 0.0))  # 36.4 m
 
 
 def ahead_and_aside(y):

@@ -277,6 +277,46 @@ SCENARIOS = (
         response="longitudinal",
         kind="backing up",
     ),
+    Scenario(
+        "an object on the road",
+        "It is 1 m long and lies 100 m ahead. As with a stalled car D(20, 0) = 66.375 m is left after 1.68 s.",
+        (ego(), ahead(100.0, 0.0, name="object", length=1.0)),
+        *("ego", ""),
+        partner="object",
+        danger=1.681,
+        axis="longitudinal",
+        response="longitudinal",
+        kind=FOLLOWING,
+    ),
+    Scenario(
+        "the leader pulls over and stops",
+        "3 m/s^2 and 1 m/s to the right from 1 s on. gap = 50 - 1.5 tau^2, D = 66.375 - (20 - 3 tau)^2 / 16 = 41.375 + "
+        "7.5 tau - 0.5625 tau^2: 0.9375 tau^2 + 7.5 tau = 8.625 at tau = 1.02, t = 2.02 s, 1 m to the side by then. An "
+        "ego that goes on is there when 1.5 tau^2 = 50, tau = 5.8, and the other out of its lane since tau = 4.",
+        (ego(), ahead(50.0, 20.0, from_second_one(-3.0), ((1.0, 5.0, 1.0),))),
+        *("", ""),
+        partner="leader",
+        danger=2.019,
+        axis="longitudinal",
+        response="longitudinal",
+        kind=FOLLOWING,
+    ),
+    Scenario(
+        "secondary hit: the leader runs into a stalled car",
+        "The leader is 60 m ahead at 20 m/s, the stalled car 35 m before it: they touch at 1.75 s, and a wreck may "
+        "stop on "
+        "the spot: D(20, 0) = 66.375 > 60 m at once. Here it slides, losing its speed by e every second, 20 m in all. "
+        "With the shield the ego needs 52 m from 1.8 s on, and has 60 m and more. Without it touches, after 80 m at "
+        "5.8 "
+        "s: it has not braked, and the leader stopped shorter than with 8 m/s^2.",
+        (ego(), ahead(60.0, 20.0), ahead(100.0, 0.0, name="stalled")),
+        *("both", ""),
+        partner="leader",
+        danger=1.75,
+        axis="longitudinal",
+        response="longitudinal",
+        kind=FOLLOWING,
+    ),
     # ------------------------------------------------------------ somebody behind
     Scenario(
         "rear-ended while standing",

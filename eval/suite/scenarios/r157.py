@@ -25,6 +25,8 @@ from rss_shield.shield._numba.compiled import compiled_for_arrays
 from rss_shield.shield.command import Command
 from rss_shield.shield.geometry import largest_half_extents
 from rss_shield.shield.lanes.controller import Body, find_danger, respond
+from rss_shield.shield.lanes.evasion import Room, evade
+from rss_shield.shield.lanes.judge import judge_frame
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
 from rss_shield.shield.params import PRESETS, Preset, Rules
@@ -134,27 +136,28 @@ def drive(cases: Cases, driver: str) -> np.ndarray:
     return hit
 
 
-def drive_shield(cases: Cases, preset: Preset) -> np.ndarray:
+def drive_shield(cases: Cases, preset: Preset, evasion: bool = False) -> np.ndarray:
     """The same with a shield on an ego that would go on, `[C]`. What is hidden is not there for it.
 
     Args:
       cases: `Cases`.
       preset: the table.
+      evasion: it makes an evasive effort, along its lane.
     """
     table = table_for(preset, Rules(anticipation=0.0), DT)
     half = largest_half_extents(LENGTH, WIDTH, table.rules.heading_bound)
-    return np.array([_is_hit(*map(float, case), *half, table) for case in zip(*cases, strict=True)], bool)
+    return np.array([_is_hit(*map(float, case), *half, evasion, table) for case in zip(*cases, strict=True)], bool)
 
 
 @compiled_for_arrays
-def _is_hit(v, u, gap, lateral, braking, hidden, half_length, half_width, table):
+def _is_hit(v, u, gap, lateral, braking, hidden, half_length, half_width, evasion, table):
     ego, users, ego_before, users_before = (
         np.zeros(1, ROAD_USER),
         np.zeros(1, ROAD_USER),
         np.zeros(1, ROAD_USER),
         np.zeros(1, ROAD_USER),
     )
-    memory = np.zeros(1, MEMORY)
+    memory, evading = np.zeros(1, MEMORY), False
     body = Body(0.5 * LENGTH, 0.5, 0.0, 0.0, False)
     s, s_other, y_other = 0.0, gap + LENGTH, 0.0
     if lateral > 0.0:
@@ -170,7 +173,14 @@ def _is_hit(v, u, gap, lateral, braking, hidden, half_length, half_width, table)
         a = 0.0
         if k * DT >= hidden:
             danger = find_danger(ego[0], users, ego_before[0], users_before, memory, table)
-            a = respond(Command(0.0, 0.0), danger, ego[0], body, table.rules, table.dt).command.acceleration
+            wish = Command(0.0, 0.0)
+            if evasion:
+                effort = evade(wish, evading, ego[0], users, memory, Room(0.0, 0.0), body, danger.bounds, table)
+                wish, evading = effort.wish, effort.evading
+            command = respond(wish, danger, ego[0], body, table.rules, table.dt).command
+            if danger.dangerous:
+                judge_frame(ego[0], users, memory, command, 0.0, table)
+            a = command.acceleration
             ego_before[0], users_before[0] = ego[0], users[0]
         if abs(s_other - s) <= LENGTH and abs(y_other) <= WIDTH:
             return True

@@ -28,13 +28,15 @@ _KINDS: tuple[tuple[str, Callable[[], Cases]], ...] = (
     ("cut-out", cut_outs),
 )
 _SHOWN = ((60, 20), (130, 70))  # km/h of ego and other in the picture
-_COLOURS = ("0.8", "tab:orange", "tab:blue", "tab:green", "tab:olive", "tab:red")
+_COLOURS = ("0.8", "tab:orange", "tab:blue", "tab:green", "tab:olive", "tab:red", "tab:purple")
 
 
 def contacts_of(cases: Cases) -> dict[str, np.ndarray]:
     """Who touches the other, by driver: `[C]` each."""
     return {name: drive(cases, name) for name in DRIVERS} | {
-        f"shield, {name}": drive_shield(cases, preset) for name, preset in TABLES.items()
+        f"shield, {name}{' + evasion' * evasion}": drive_shield(cases, preset, evasion)
+        for name, preset in TABLES.items()
+        for evasion in ((False, True) if name == "careful" else (False,))
     }
 
 
@@ -60,7 +62,8 @@ def page_of(found: dict[str, dict[str, np.ndarray]]) -> str:
         "0.774 g "
         "(7.6 m/s²) after 0.75 s. The shield is on an ego that would go on at its speed: with the table *simulator* "
         "(reacts in 0.15 s, relies on 5 m/s²), *slides* (1 s, 4 m/s²), and *careful*: as slides, but with the careful "
-        "driver's delay and braking. A shield that begins nearer than its table asks brakes at once.",
+        "driver's delay and braking. *+ evasion*: with evasive effort along the lane. A shield that begins nearer "
+        "than its table asks brakes at once.",
     ]
     for kind, by in found.items():
         count = len(by["careful driver"])
@@ -76,12 +79,15 @@ def page_of(found: dict[str, dict[str, np.ndarray]]) -> str:
     cut = found["cut-in"]
     passes = ~cut["nobody brakes"]
     shield = np.all([cut[name] for name in cut if name.startswith("shield")], axis=0)
+    evades = cut["shield, careful + evasion"]
     early = cut["shield, careful"] & ~cut["careful driver"]
     sections += [
         f"Of the {spaced(int(early.sum()))} cut-ins that the careful driver avoids and a shield with its braking does "
         f"not, {spaced(int((early & passes).sum()))} are avoided by doing nothing: the ego would have been past before "
-        "the other came over, and a shield that brakes for it is beside it then. Whoever comes over is to blame; "
-        f"[evasion](evasion.md) is for such cases. {spaced(int((shield & ~passes).sum()))} cut-ins no shield avoids.",
+        "the other came over, and a shield that brakes for it is beside it then. Whoever comes over is to blame. With "
+        "[evasive effort](../adversaries.md#evasive-effort), which may speed up but not go against the duty to brake, "
+        f"{spaced(int((early & ~evades).sum()))} of these are avoided. {spaced(int((shield & ~passes).sum()))} "
+        f"cut-ins no shield avoids.",
         "![Which cut-ins end in a contact](r157.png)",
     ]
     return "\n\n".join(sections) + "\n"
