@@ -4,10 +4,10 @@
     python bench/adversary.py --write                 writes docs/results/adversary.md and its picture of what is there
     python bench/adversary.py --only whole            against one of the shields
 
-It drives the ego, with throttle and wheels, against the whole shield and against shields without one of its conditions
-each. Every contact is judged afterwards by the whole table (`rss-shield judge`), not by the rules that are left, and
-the first one at fault is kept as a trace. A small reward for small margins shows the way. One training is one file in
-runs/adversary, written as it goes on; one that is whole is not repeated.
+It drives the ego, with throttle and wheels, against the whole shield and against shields without one or two of its
+conditions. Every contact is judged afterwards by the whole table (`rss-shield judge`), not by the rules that are left,
+and the first one at fault is kept as a trace. A small reward for small margins shows the way. One training is one file
+in runs/adversary, written as it goes on; one that is whole is not repeated.
 """
 
 import dataclasses
@@ -38,17 +38,16 @@ from rss_shield.shield.verdicts import AT_FAULT
 PAGE, PICTURE = Path("docs/results/adversary.md"), Path("docs/results/adversary.png")
 ENV_ID = "highway-fast-v0"
 CONFIG = {"action": {"type": "ContinuousAction"}, "vehicles_count": 12, "vehicles_density": 1.5, "duration": 20}
-# one condition dropped each; anticipation is off there, which would else hide some of it
+# what is dropped; anticipation is off there, which would else hide some of it
 SHIELDS: dict[str, dict[str, Any]] = {
     "whole": {},
+    "no duty along the lane (Def. 4, H23)": {"longitudinal": False, "present_duties": False},
+    "no answer to who has cut in (H23)": {"present_duties": False},
+    "no duty across the lane (Def. 8, H23)": {"lateral": False, "present_duties": False},
+    "no limits of acceleration and lateral speed (C1)": {"limits": False},
+    "no limits, no bound of the heading": {"limits": False, "heading_bound": 1.0},
     "no braking for lost distance (Def. 4)": {"longitudinal": False},
     "no stop across the lane (Def. 8)": {"lateral": False},
-    "no limits of acceleration and lateral speed (C1)": {"limits": False},
-    "no memory of the axis (C7)": {"memory": False},
-    "no answer to who has cut in (H6, H23)": {"present_duties": False},
-    "no bound of the heading": {"heading_bound": 1.0},
-    "credit for receding (H22)": {"no_credit": False},
-    "no margins for sampling (C5)": {"discretisation_margin": False, "overlap_margin": 0.0},
 }
 ENVS = 128
 STEPS = 64  # of each environment between two updates
@@ -153,15 +152,16 @@ def page_of(results: list[dict[str, Any]]) -> str:
             f"(`{ENV_ID}`, 12 cars at 1.5 times the density, episodes of 20 s) and is paid 1 for a contact that is the "
             "ego's fault and up to 0.02 per decision for small margins; nothing else. Contacts are judged afterwards "
             "by "
-            "the whole table, whatever shield was there. Against shields that lack one condition anticipation is off, "
+            "the whole table, whatever shield was there. Against shields that lack a condition anticipation is off, "
             "too. *First after*: decisions after which the rollout with the first fault ended. Rates are over all "
             "episodes of the training, exact intervals.",
             markdown(rows),
             "![Faults found while training](adversary.png)",
-            "A shield without a condition in which nothing was found is not proof that the condition is not needed: "
-            "what "
-            "each one is for, and scenes in which it is missed, is in [what each rule buys](ablation.md). Credit for "
-            "receding cars (H22), for example, takes three cars abreast.",
+            "A shield without a condition against which nothing was found is no proof that the condition is not "
+            "needed: "
+            "several answer the same danger (without Def. 4 the ego still brakes for whoever is in its way now, H23), "
+            "and some are missed only in scenes that this traffic does not have. What each one is for: "
+            "[what each rule buys](ablation.md).",
         ]
     )
 
