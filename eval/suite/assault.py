@@ -58,7 +58,7 @@ def _switching(env: Callable[[], Any], rng: np.random.Generator) -> Act:
 
 
 def _bang_bang(env: Callable[[], Any], rng: np.random.Generator) -> Act:
-    return _held(rng, lambda count: rng.choice(np.float32([-1.0, 1.0]), size=(count, 2)))
+    return _held(rng, lambda count: rng.choice([-1.0, 1.0], size=(count, 2)).astype(np.float32))
 
 
 def _wild(env: Callable[[], Any], rng: np.random.Generator) -> Act:
