@@ -19,8 +19,8 @@ def make(env_id: str, shield: str | None = "override", params: Params = None, **
       shield: "override", "monitor", or None for the bare environment.
       params: the table in force, see `ShieldWrapper`.
       kwargs: the other options of a shield: `rules`, `intervention_penalty`, `penalty_on`, `record`, `entry`, `intent`,
-        `waiting`, `traffic`, `examine`, `risk`, `measures`, `filter`, `filter_at`, `correction`, `replace`,
-        `judge_params`, `judge_rules`, see `ShieldWrapper`. The rest is passed to `gymnasium.make`, e.g.
+        `waiting`, `traffic`, `examine`, `risk`, `measures`, `filter`, `filter_at`, `correction`, `evasion`,
+        `replace`, `judge_params`, `judge_rules`, see `ShieldWrapper`. The rest is passed to `gymnasium.make`, e.g.
         `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:

@@ -62,9 +62,9 @@ def make_vec(
       wrappers: put around in this order: gymnasium's `VectorWrapper`s around the whole on either backend, and wrappers
         of single environments around each where the backend is "highway-env".
       kwargs: `max_episode_steps`; `render_mode` (the engine knows "rgb_array"); `rules`, `intervention_penalty`,
-        `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `replace` and `risk`
-        of `ShieldWrapper`; and whatever else `make` takes (`traffic`, `judge_params`, ...) where the backend is
-        "highway-env".
+        `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `evasion`, `replace`
+        and `risk` of `ShieldWrapper`; and whatever else `make` takes (`traffic`, `judge_params`, ...) where the backend
+        is "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.

@@ -57,6 +57,7 @@ class Settings(NamedTuple):
     examine: int = TABLE  # against whom plans are checked: index into `shield.junctions.examined.EXAMINED`
     filter: Filter = Filter(RSS)  # what acts in the shield's place
     correction: int = NEAREST  # what a duty makes of a command: index into `shield.lanes.correction.CORRECTIONS`
+    evasion: bool = False  # manoeuvres out of others' way where that is owed (Def. 13)
 
 
 class Given(TypedDict, total=False):
@@ -76,6 +77,7 @@ class Given(TypedDict, total=False):
     filter: str
     filter_at: float | None
     correction: str
+    evasion: bool
     replace: str
     judge_params: Params
     judge_rules: Rules | Mapping[str, Any] | None
@@ -104,6 +106,7 @@ class Options:
     filter: str = "rss"
     filter_at: float | None = None
     correction: str = "nearest"
+    evasion: bool = False
     replace: str = "frame"
     judge_params: Params = None
     judge_rules: Rules | Mapping[str, Any] | None = None
@@ -124,8 +127,9 @@ class Options:
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {', '.join(known)}")
 
-        if not isinstance(self.measures, bool):
-            raise ValueError(f"measures = {self.measures!r}: expected True or False")
+        for name in ("measures", "evasion"):
+            if not isinstance(getattr(self, name), bool):
+                raise ValueError(f"{name} = {getattr(self, name)!r}: expected True or False")
         if self.filter_at is not None:
             number("filter_at", self.filter_at, 0.01)
             if FILTERS.index(self.filter) not in THRESHOLDS:
@@ -158,6 +162,7 @@ class Options:
             "examine": EXAMINED.index(self.examine),
             "filter": self._filter,
             "correction": CORRECTIONS.index(self.correction),
+            "evasion": self.evasion,
         }
 
     @property
@@ -292,3 +297,7 @@ def _check_distances(scheme: int, conduct: dict[str, Any]) -> None:
     ):
         if scheme == PLANS and index != 0:
             raise ValueError(f"{name} = {known[index]!r}: expected {known[0]!r} where roads cross")
+    if conduct["evasion"] and scheme == PLANS:
+        raise ValueError("evasion = True: expected False where roads cross")
+    if conduct["evasion"] and conduct["filter"].kind != RSS:
+        raise ValueError(f"evasion = True with filter = {FILTERS[conduct['filter'].kind]!r}: expected filter = 'rss'")

@@ -33,6 +33,7 @@ from rss_shield.envs.fast.tasks import (
 )
 from rss_shield.envs.fast.views.describe import Glance, views_of
 from rss_shield.envs.fast.views.record import View
+from rss_shield.envs.roads.hostile import NO_VICE, vice_of
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network, compile_network
 from rss_shield.envs.stock import drivers_unchanged, make_stock
 
@@ -98,6 +99,7 @@ def compile_scenario(
     record["max_steps"] = (wrapped.spec and wrapped.spec.max_episode_steps) or 0
     record["duration"] = given.get("duration", np.inf)
     _fill_traffic(record, kind)
+    record["vice"], record["bounded"] = vice_of(given["other_vehicles_type"]) or (NO_VICE, False)
     target_speeds, labels, choices = _fill_action(record, env.action_type)
     number = {index: i for i, index in enumerate(env.road.network.lanes_dict())}
     describe_of(scenario)(record, given, env, number)
@@ -152,8 +154,9 @@ def _check_action(scenario: int, env_id: str, asked: dict) -> None:
 
 def _checked(given: dict) -> type[IDMVehicle]:
     """The kind of the traffic, if the engine can run a configuration."""
-    if given["other_vehicles_type"] not in KINDS:
-        raise Unsupported(f"other_vehicles_type = {given['other_vehicles_type']!r}", f"one of {', '.join(KINDS)}")
+    asked = given["other_vehicles_type"]
+    if asked not in KINDS and vice_of(asked) is None:
+        raise Unsupported(f"other_vehicles_type = {asked!r}", f"one of {', '.join(KINDS)}, or one of HOSTILE")
     if (IDMVehicle.LENGTH, IDMVehicle.WIDTH) != (CAR_LENGTH, CAR_WIDTH):
         raise Unsupported(
             f"vehicles of {IDMVehicle.LENGTH:g} m x {IDMVehicle.WIDTH:g} m", f"{CAR_LENGTH:g} m x {CAR_WIDTH:g} m"
@@ -162,7 +165,7 @@ def _checked(given: dict) -> type[IDMVehicle]:
         raise Unsupported(f"controlled_vehicles = {given['controlled_vehicles']}", "1")
     if given["manual_control"]:
         raise Unsupported("manual_control = True", "False")
-    return KINDS[given["other_vehicles_type"]]
+    return KINDS.get(asked, IDMVehicle)  # hostile drivers are IDM drivers but for one vice
 
 
 def _fill_traffic(record, kind: type[IDMVehicle]) -> None:

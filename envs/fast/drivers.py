@@ -12,7 +12,8 @@ from rss_shield.envs._numpy.ufuncs import power, power_each
 from rss_shield.envs.fast.linear_drivers import linear_acceleration, linear_steering
 from rss_shield.envs.fast.sight import car_ahead, car_behind, locate
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, TRAFFIC
-from rss_shield.envs.roads.network import distance, is_after_end, is_reachable, local_coordinates, position
+from rss_shield.envs.roads.hostile import NO_VICE, harass, hostile_command
+from rss_shield.envs.roads.network import distance, heading_at, is_after_end, is_reachable, local_coordinates, position
 from rss_shield.envs.roads.steering import is_aligned, steer
 from rss_shield.shield._numba.compiled import inner, part
 
@@ -32,14 +33,28 @@ def list_changing(cars, n, sight):
 
 
 @inner
-def decide(cars, first, last, n, changing, net, lanes, sight, idm):
+def note_change(cars, i, changing, sight):
+    """Take car `i` into the list of `list_changing`, if it heads for another lane by now; returns how many do."""
+    if cars[i].target_lane == cars[i].lane:
+        return changing
+    for b in range(changing):
+        if sight.changing[b] == i:
+            return changing
+    sight.changing[changing] = i
+    return changing + 1
+
+
+@inner
+def decide(cars, first, last, n, ego, changing, net, lanes, sight, idm):
     """Commands of the vehicles `first` to `last` - 1 for one frame.
 
-    In four passes, each with little to foretell for the processor. Only the third sees what others decided.
+    In four passes, each with little to foretell for the processor. Only the third sees what others decided. Whoever is
+    hostile then does something else.
 
     Args:
       cars: `[N]` CAR.
       n: road users.
+      ego: index of the controlled vehicle, if there is one yet.
       changing: how many cars change lanes, see `list_changing`.
       net, lanes: the network and its LANE records.
       sight: this frame's, with the cars lined up.
@@ -52,6 +67,8 @@ def decide(cars, first, last, n, changing, net, lanes, sight, idm):
     busy = _follow(cars, first, last, n, net, lanes, sight, idm)
     changing = _change_lanes(cars, busy, n, changing, net, lanes, sight, idm)
     _carry_out(cars, first, last, lanes, sight, idm, sight.linear)
+    if idm.vice != NO_VICE:
+        _do_harm(cars, first, last, ego, lanes, idm)
     return changing
 
 
@@ -144,6 +161,26 @@ def _steer_linear(cars, first, last, lanes, sight, linear):
         car, k = cars[i], cars[i].target_lane
         if _is_in_traffic(car):
             car.steering = linear_steering(car, lanes[k], sight.s[k, i], sight.lateral[k, i], linear[5])
+
+
+@part
+def _do_harm(cars, first, last, ego, lanes, idm):
+    """What hostile drivers do instead: `envs.highway.hostile.HostileVehicle.act`."""
+    victim = cars[ego]
+    if victim.kind != META and victim.kind != DIRECT:
+        return
+    its = lanes[victim.lane]
+    s, y = local_coordinates(its, victim.x, victim.y)
+    for i in range(first, last):
+        car = cars[i]
+        if car.vice == NO_VICE or not _is_in_traffic(car):
+            continue
+        s_own, y_own = local_coordinates(its, car.x, car.y)
+        here = heading_at(lanes[car.lane], local_coordinates(lanes[car.lane], car.x, car.y)[0])
+        mirrored = np.cos(heading_at(its, s) - here) < 0.0
+        wanted = harass(car.vice, s_own - s, y_own - y, car.speed, victim.speed, car.timer, car.acceleration)
+        command = hostile_command(car.vice, idm.bounded, wanted, car.speed, car.heading - here, mirrored, car.steering)
+        car.acceleration, car.steering = command
 
 
 @inner

@@ -16,7 +16,7 @@ from rss_shield.envs.compiled import kernel, unfolded
 from rss_shield.envs.decisions.foresight import without_anticipation
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.draws import load_generator
-from rss_shield.envs.fast.drivers import take_meta_action
+from rss_shield.envs.fast.drivers import note_change, take_meta_action
 from rss_shield.envs.fast.envs.intersection import let_traffic_flow, open_intersection
 from rss_shield.envs.fast.foresight import foresee, make_desk
 from rss_shield.envs.fast.frame import act, look_around, survey, think
@@ -207,13 +207,15 @@ def _advance(
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
         changing = look_around(cars, episode, order, net, sight, flow)
-        # plans depend on the lanes that others head for: the shield looks when those up to the ego have decided
-        in_turn = plans is not None and mode != OFF
+        # plans depend on the lanes that others head for, and those after the ego see the lane that it is given back:
+        # the shield looks when those up to the ego have decided
+        in_turn = mode != OFF and (plans is not None or settings.table.rules.take_back)
         first, last = 0, episode.ego + 1 if in_turn else episode.vehicles
         while first < episode.vehicles:  # a loop, lest the kernel contain it twice
             changing = think(cars, episode, first, last, changing, net, sight, config)
             if first == 0 and mode != OFF:
                 watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watch, settings, step)
+                changing = note_change(cars, episode.ego, changing, sight)
             first, last = last, episode.vehicles
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:

@@ -32,7 +32,7 @@ def look_around(cars, episode, order, net, sight, flow):
 @inner
 def think(cars, episode, first, last, changing, net, sight, config):
     """Commands of the vehicles `first` to `last` - 1; returns how many cars change lanes then."""
-    return decide(cars, first, last, episode.cars, changing, net, net.lanes, sight, config)
+    return decide(cars, first, last, episode.cars, episode.ego, changing, net, net.lanes, sight, config)
 
 
 @inner

@@ -35,6 +35,7 @@ from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.plans import Scene
 from rss_shield.shield.lanes.controller import Body, Response, find_danger, respond
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
+from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up
@@ -131,7 +132,7 @@ def start_watch(episode, distances, plans, ride, watch):
     start_ride(ride)
     episode.room_left = episode.room_right = np.inf
     episode.path, episode.go, episode.frames_trapped = -1, -1, 0
-    episode.held_at, episode.wronged, episode.answers = np.inf, False, False
+    episode.held_at, episode.wronged, episode.answers, episode.evading = np.inf, False, False, False
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     start_episode(episode)
@@ -217,8 +218,15 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
         if others_act:
             response = _answer(wish, car, danger, episode, sight, distances, body, settings, step)
         else:
-            wanted = _take_back(wish, car, ego, episode, lanes, sight, body, settings, step)
+            wanted, evades = _take_back(wish, car, ego, episode, lanes, sight, body, settings, step), False
+            if settings.evasion:
+                room = _room(car, episode, lanes, sight)
+                wanted, episode.evading, evades = evade(
+                    wanted, episode.evading, ego, users, memory, room, body, danger.bounds, settings.table, who
+                )
             response = respond(wanted, danger, ego, body, settings.table.rules, settings.table.dt)
+            if evades:
+                response = Response(response.command, True, False, False)
             if settings.correction == RESPONSE:
                 response = in_full(response, danger, ego, body, settings.table.rules, settings.table.dt)
         command, steered = response.command, steering
@@ -234,6 +242,14 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     if danger.partner >= 0:
         step.margin_lon, step.margin_lat = danger.margin_lon, danger.margin_lat
         step.partner = car_of(danger.partner, episode)
+
+
+@inner
+def _room(car, episode, lanes, sight):
+    """`envs.highway.ego.ShieldedEgo._room`."""
+    lane = lanes[car.lane]
+    offset, half = sight.lateral[car.lane, episode.ego], 0.5 * (lane.width - car.width)
+    return Room(lane.id * lane.width + half + offset, (lane.siblings - 1 - lane.id) * lane.width + half - offset)
 
 
 @part

@@ -33,6 +33,8 @@ CONFIG = np.dtype(
         ("delta", "f8"),
         ("delta_low", "f8"),
         ("delta_high", "f8"),
+        ("vice", "i8"),  # of everybody, see `envs.roads.hostile`
+        ("bounded", "?"),  # in which they keep to the table's limits
         # scene
         ("traffic", "i8"),  # vehicles besides the ego
         ("traffic_checks", "?"),  # they look for collisions themselves

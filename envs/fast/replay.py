@@ -3,12 +3,13 @@
 import numpy as np
 from highway_env.road.lane import AbstractLane
 from highway_env.road.regulation import RegulatedRoad
+from highway_env.utils import class_from_path
 from highway_env.vehicle.behavior import IDMVehicle, LinearVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.fast.draws import generator_state, load_generator
-from rss_shield.envs.fast.linear_drivers import KINDS
 from rss_shield.envs.fast.state import CAR, DIRECT, LINEAR_CAR, META, OBSTACLE, TRAFFIC
+from rss_shield.envs.roads.hostile import NO_VICE
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network
 
 _GAINS = tuple(name for name in LINEAR_CAR.names or () if name not in (CAR.names or ()))
@@ -51,7 +52,9 @@ def _vehicle(env, car, indices, network: Network):
     """One highway-env vehicle."""
     pose = (env.road, [car["x"], car["y"]], float(car["heading"]), float(car["speed"]))
     if car["kind"] == TRAFFIC:
-        vehicle = KINDS[env.config["other_vehicles_type"]](*pose)
+        vehicle = class_from_path(env.config["other_vehicles_type"])(*pose)
+        if car["vice"] != NO_VICE:
+            vehicle.vice, vehicle.heading = int(car["vice"]), float(car["heading"])
         if issubclass(type(vehicle), LinearVehicle):
             gains = [float(car[name]) for name in _GAINS]
             vehicle.ACCELERATION_PARAMETERS, vehicle.STEERING_PARAMETERS = gains[:3], gains[3:]
@@ -151,6 +154,7 @@ def _read_user(car, user, numbers, network: Network) -> None:
         car["kind"] = TRAFFIC
         car["timer"], car["delta"], car["changes_lane"] = user.timer, user.DELTA, user.enable_lane_change
         car["yields"] = getattr(user, "is_yielding", False)
+        car["vice"] = getattr(user, "vice", NO_VICE)
     if isinstance(user, LinearVehicle):
         for name, gain in zip(_GAINS, [*user.ACCELERATION_PARAMETERS, *user.STEERING_PARAMETERS], strict=True):
             car[name] = gain

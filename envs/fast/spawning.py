@@ -6,6 +6,7 @@ from rss_shield.envs.fast.draws import uniform
 from rss_shield.envs.fast.drivers import speed_to_index
 from rss_shield.envs.fast.motion import set_heading
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
+from rss_shield.envs.roads.hostile import NO_VICE, WRONG_WAY, vice_at
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, closest_lane, heading_at, local_coordinates, position
 from rss_shield.shield._numba.compiled import part
 
@@ -25,7 +26,7 @@ def add_vehicle(cars, episode, x, y, heading, speed, lanes, config):
     car.length, car.width = CAR_LENGTH, CAR_WIDTH
     car.kind = TRAFFIC
     car.lane = car.target_lane = closest_lane(lanes, x, y, heading)
-    car.speed_index, car.route, car.route_step = 0, -1, 0
+    car.speed_index, car.route, car.route_step, car.vice = 0, -1, 0, NO_VICE
     car.crashed = car.hit = False
     car.checks = car.changes_lane = True
     car.yields = False
@@ -38,7 +39,17 @@ def add_vehicle(cars, episode, x, y, heading, speed, lanes, config):
 def add_on_lane(cars, episode, lane, s, speed, lanes, config):
     """Put a car of the traffic on a lane, along it; returns its index."""
     x, y = position(lane, s, 0.0)
-    return add_vehicle(cars, episode, x, y, heading_at(lane, s), speed, lanes, config)
+    return add_traffic(cars, episode, x, y, heading_at(lane, s), speed, lanes, config)
+
+
+@part
+def add_traffic(cars, episode, x, y, heading, speed, lanes, config):
+    """Put a car of the traffic on the road, hostile or not; returns its index."""
+    vice = vice_at(config.vice, x, y)
+    turned = np.pi if vice == WRONG_WAY else 0.0
+    i = add_vehicle(cars, episode, x, y, heading + turned, speed, lanes, config)
+    cars[i].vice = vice
+    return i
 
 
 @part

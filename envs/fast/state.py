@@ -40,6 +40,7 @@ CAR = np.dtype(
         ("speed_index", "i8"),  # among the target speeds, of a META car
         ("route", "i8"),  # row of the route tables, -1 = none
         ("route_step", "i8"),  # steps of the route that lie behind
+        ("vice", "i8"),  # of a hostile driver, see `envs.roads.hostile`
         ("crashed", "?"),
         ("hit", "?"),  # an impact is due
         ("checks", "?"),  # looks for collisions itself
@@ -83,6 +84,7 @@ EPISODE = np.dtype(
         ("held_at", "f8"),  # acceleration to which it was held back on the last frame, inf = it was not [m/s^2]
         ("wronged", "?"),  # somebody broke a duty, and it has had no plan since that stays clear of everybody
         ("refused", "?"),  # the lane change of this decision was taken back
+        ("evading", "?"),  # a manoeuvre out of somebody's way has begun, and the danger lasts
         ("answers", "?"),  # a filter that looks once per decision responds in this one
         ("frames_trapped", "i8"),  # on which no plan stayed clear of everybody
         ("pairs_examined", "i8"),  # pair-frames on which plans were checked against somebody

@@ -22,6 +22,7 @@ from rss_shield.shield.lanes.controller import (
     respond,
 )
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
+from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
 from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
@@ -141,6 +142,7 @@ class ShieldedEgo:
         self.meter: Any = None  # `RiskMeter` that looks on after each frame
         self.measured: Any = None  # `EgoMeter` likewise
         self.judge = self  # or another, which watches by a table of its own
+        self.evading = False  # a manoeuvre has begun, and the danger lasts
         self.answers = False  # does a filter that looks once per decision respond in this one?
         vehicle.act = self.act
 
@@ -223,10 +225,24 @@ class ShieldedEgo:
             state = self.answers, bool(self.tally["frames"] == 0)
             response, self.answers = answer(settings.filter, wish, traffic, danger.free, *state, body, table)
             return response
-        response = respond(self._taken_back(wish, ego, body), danger, ego, body, table.rules, table.dt)
+        wanted, evades = self._taken_back(wish, ego, body), False
+        if settings.evasion:
+            seen = ego, users, self.memory, self._room()
+            wanted, self.evading, evades = evade(wanted, self.evading, *seen, body, danger.bounds, table, None)
+        response = respond(wanted, danger, ego, body, table.rules, table.dt)
+        if evades:
+            response = Response(response.command, True, False, False)
         if settings.correction == RESPONSE:
             response = in_full(response, danger, ego, body, table.rules, table.dt)
         return response
+
+    def _room(self) -> Room:
+        """How far the vehicle may move to either side on its road."""
+        vehicle = self.vehicle
+        start, end, lane = vehicle.lane_index
+        lanes, width = len(vehicle.road.network.graph[start][end]), float(vehicle.lane.width_at(0.0))
+        offset, half = self._offset(vehicle.lane_index), 0.5 * (width - vehicle.WIDTH)
+        return Room(lane * width + half + offset, (lanes - 1 - lane) * width + half - offset)
 
     def _count(self, danger, response, pairs: int, broken: int) -> None:
         on = self.settings.overrides

@@ -32,7 +32,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
       intervention_penalty: subtracted from each agent's reward, times what `penalty_on` names of its own; from one
         reward for all, times the mean of that.
       mode, penalty_on, params, rules, record, entry, intent, waiting, traffic, examine, risk, filter, filter_at,
-        correction, judge_params, judge_rules: see `ShieldWrapper`.
+        correction, evasion, judge_params, judge_rules: see `ShieldWrapper`.
 
     Raises:
       ValueError: as `ShieldWrapper`.

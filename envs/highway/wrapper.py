@@ -98,6 +98,8 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         files.
       correction: what a duty makes of a command: the "nearest" permitted one, or the proper "response" in full
         (`rss_shield.shield.lanes.correction`); the latter along lanes only.
+      evasion: where others do not comply, or braking alone ends in a contact, get out of the way by a manoeuvre out of
+        a finite family, if one harms nobody (Defs. 11-13, `rss_shield.shield.lanes.evasion`); along lanes only.
       replace: "frame", commands are restricted on every frame, or "decision", before that a meta-action whose
         `action_masks` is False is replaced by the nearest one whose mask is True
         (`rss_shield.envs.decisions.replacement`).

@@ -15,7 +15,7 @@ from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules, with_par
 OTHERS = {"reckless": RECKLESS, **HOSTILE}  # who else is on the road, by name
 _SHIELD = (
     *("entry", "intent", "waiting", "examine", "traffic", "risk", "measures"),
-    *("filter", "filter_at", "correction", "replace", "intervention_penalty", "penalty_on"),
+    *("filter", "filter_at", "correction", "evasion", "replace", "intervention_penalty", "penalty_on"),
 )
 _TABLE = ("preset", "ego", "other")
 KNOWN = ("shield", "backend", "others", "config", "rules", "judge", *_TABLE, *_SHIELD)

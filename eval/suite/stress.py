@@ -1,9 +1,9 @@
 """`rss-shield stress`: very many episodes in the engine, until somebody finds an ego at fault.
 
-A campaign is environments x policies x presets, played in blocks of seeds; a block is one file, written when it is
-finished, so a campaign that was killed goes on where it stopped, and nothing is counted twice or lost. At the first
-verdict that charges the ego, or none, the episode is played again on highway-env with the same actions, and its trace
-is kept beside the blocks for `rss-shield judge`.
+A campaign is environments x policies x traffic x presets, played in blocks of seeds; a block is one file, written when
+it is finished, so a campaign that was killed goes on where it stopped, and nothing is counted twice or lost. At the
+first verdict that charges the ego, or none, the episode is played again on highway-env with the same actions, and its
+trace is kept beside the blocks for `rss-shield judge`.
 """
 
 import argparse
@@ -11,7 +11,7 @@ import hashlib
 import itertools
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,17 +22,20 @@ from gymnasium.vector import AutoresetMode
 from rss_shield.envs.highway.recorder import record_trace
 from rss_shield.envs.make import make
 from rss_shield.envs.make_vec import make_vec
+from rss_shield.envs.roads.hostile import HOSTILE
 from rss_shield.eval.files import write_json
 from rss_shield.eval.rollout import NO_CONTACT, evaluate
 from rss_shield.eval.stats import clopper_pearson
+from rss_shield.eval.suite.assault import CONTINUOUS, FREE, POLICIES, STEERED, policy_of
+from rss_shield.eval.suite.stress_page import write_page
+from rss_shield.eval.suite.watched import Watched
 from rss_shield.shield.params import PRESETS
 from rss_shield.shield.trace import save
 from rss_shield.shield.verdicts import AT_FAULT, VERDICTS
 
-POLICIES = ("random", "faster", "slower", "switching")
 DEFAULT_ENVS = ("highway-fast-v0", "merge-v0", "exit-v0", "two-way-v0", "roundabout-v0", "intersection-v0")
+STOCK = "stock"  # the environment's own traffic
 SIDE_BY_SIDE = 512  # environments in the engine
-_KEPT_FOR = 0.2  # chance per decision that a switching policy takes another action
 BAD = (*AT_FAULT, "none")  # verdicts that a campaign stops at
 
 
@@ -45,22 +48,46 @@ class Block(NamedTuple):
     shield: str
     first: int  # seed
     episodes: int
+    traffic: str = STOCK  # or one of HOSTILE
+    judged: bool = False  # contacts are judged from the outside, too
 
     @property
     def name(self) -> str:
         """Of its file; the same block has the same, in any campaign."""
         digest = hashlib.sha256(json.dumps(self).encode()).hexdigest()[:8]
-        return f"{self.env_id}_{self.policy}_{self.params or 'own'}_{self.shield}_{self.first}_{digest}.json"
+        mode = f"{self.shield}{'_judged' if self.judged else ''}"
+        kind = f"{self.env_id}_{self.policy}_{self.traffic}_{self.params or 'own'}_{mode}"
+        return f"{kind}_{self.first}_{digest}.json"
+
+    @property
+    def config(self) -> dict[str, Any] | None:
+        """Of its environment."""
+        config: dict[str, Any] = dict(CONTINUOUS) if self.policy in FREE else {}
+        if self.traffic != STOCK:
+            if self.traffic not in HOSTILE:
+                known = ", ".join((STOCK, *HOSTILE))
+                raise ValueError(f"traffic = {self.traffic!r}: expected one of {known}")
+            config["other_vehicles_type"] = HOSTILE[self.traffic]
+        return config or None
 
 
 def blocks_of(
-    envs: list[str], policies: list[str], presets: list[str], shield: str, seed: int, episodes: int, size: int
+    envs: Iterable[str],
+    policies: Iterable[str],
+    presets: Iterable[str],
+    shield: str,
+    seed: int,
+    episodes: int,
+    size: int,
+    traffic: Sequence[str] = (STOCK,),
+    judged: bool = False,
 ) -> list[Block]:
-    """All blocks of a campaign, a little of everything first."""
+    """All blocks of a campaign, a little of everything first. The engine steers freely on some roads only."""
     starts = range(seed, seed + episodes, size)
     return [
-        Block(env_id, policy, params, shield, first, min(size, seed + episodes - first))
-        for first, env_id, policy, params in itertools.product(starts, envs, policies, presets)
+        Block(env_id, policy, params, shield, first, min(size, seed + episodes - first), others, judged)
+        for first, env_id, policy, others, params in itertools.product(starts, envs, policies, traffic, presets)
+        if policy not in FREE or env_id in STEERED
     ]
 
 
@@ -68,67 +95,65 @@ def play(block: Block, threads: int = 1) -> dict[str, Any]:
     """Play a block.
 
     Returns:
-      JSON: the block, episodes by verdict, seconds, duties broken, smallest time to collision, and of episodes with a
-      bad verdict seed, verdict and actions.
+      JSON: the block and what `counted` says.
     """
-    params, mode = block.params or None, AutoresetMode.DISABLED
-    rng = np.random.default_rng([block.first, block.episodes, *block.env_id.encode(), *block.policy.encode()])
-    envs: list[Any] = []
+    rng = np.random.default_rng([block.first, block.episodes, *"".join(map(str, block[:4])).encode()])
+    envs: list[Watched] = []
 
     def made(n: int) -> Any:
-        envs.append(make_vec(block.env_id, n, block.shield, params=params, threads=threads, autoreset_mode=mode))
+        options = {"params": block.params or None, "config": block.config, "threads": threads}
+        env = make_vec(block.env_id, n, block.shield, autoreset_mode=AutoresetMode.DISABLED, **options)
+        envs.append(Watched(env, block.judged))
         return envs[-1]
 
-    policy = policy_of(block.policy, lambda: int(envs[-1].single_action_space.n), rng)
+    policy = policy_of(block.policy, lambda: envs[-1].env, rng)
     seeds = range(block.first, block.first + block.episodes)
-    table = evaluate(made, policy, seeds, n_envs=min(SIDE_BY_SIDE, block.episodes))
+    table = evaluate(
+        made, policy, seeds, n_envs=min(SIDE_BY_SIDE, block.episodes), keep_actions=False, more=Watched.columns
+    )
     return {"block": block._asdict(), **counted(table)}
 
 
 def counted(table: pd.DataFrame) -> dict[str, Any]:
-    """What is kept of episodes."""
+    """What is kept of episodes: how many there were by verdict, seconds and metres driven, duties broken, pair-frames
+    in danger, seconds overridden, the smallest time to collision and margin, of episodes with a bad verdict seed,
+    verdict and actions, and likewise of those in which the judge says something else."""
     bad = table[table["blame"].isin(BAD)]
+    judged: dict[str, Any] = {}
+    if "judged" in table:
+        contacts = table[table["blame"] != NO_CONTACT]
+        others = contacts[contacts["blame"] != contacts["judged"]]
+        judged = {
+            "contacts": len(contacts),
+            "different": others[["seed", "blame", "judged", "actions"]].to_dict("records"),
+        }
     return {
         "episodes": len(table),
         "verdicts": {name: int((table["blame"] == name).sum()) for name in (*VERDICTS, NO_CONTACT)},
         "seconds": float(table["time"].sum()),
+        "metres": float((table["time"] * table["speed"]).sum()),
+        "overridden": float((table["time"] * table["override_share"]).sum()),
         "broken_duties": int(table["broken_duties"].sum()),
         "dangerous_pairs": int(table["dangerous_pairs"].sum()),
         "min_ttc": float(table["min_ttc"].min()),
+        "worst_margin": float(table["worst_margin"].min()),
         "bad": bad[["seed", "blame", "actions"]].to_dict("records"),
+        **({"judged": judged} if judged else {}),
     }
-
-
-def policy_of(name: str, actions: Callable[[], int], rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:
-    """A scripted policy of many environments; FASTER and SLOWER are the last two meta-actions, or the last and "
-    "first."""
-    if name not in POLICIES:
-        raise ValueError(f"policy = {name!r}: expected one of {', '.join(POLICIES)}")
-    last: dict[int, np.ndarray] = {}
-
-    def act(observations: np.ndarray) -> np.ndarray:
-        count, n = len(observations), actions()
-        if name == "random":
-            return rng.integers(n, size=count)
-        if name == "faster":
-            return np.full(count, n - 2 if n == 5 else n - 1)
-        if name == "slower":
-            return np.full(count, n - 1 if n == 5 else 0)
-        drawn = rng.integers(n, size=count)
-        kept = last.get(count, drawn)
-        last[count] = np.where(rng.random(count) < _KEPT_FOR, drawn, kept)
-        return last[count]
-
-    return act
 
 
 def keep_trace(block: Block, seed: int, actions: str, path: Path) -> str:
     """Play one episode of a block again on highway-env, into a file; returns the verdict there."""
-    recorded = iter([int(action) for action in actions.split()])
-    env = make(block.env_id, block.shield, block.params or None)
-    trace = record_trace(env, lambda observation: next(recorded, 0), seed)
+    recorded = iter([_action(action) for action in actions.split()])
+    env = make(block.env_id, block.shield, block.params or None, config=block.config)
+    stand_still = np.zeros(2, np.float32) if block.policy in FREE else 0
+    trace = record_trace(env, lambda observation: next(recorded, stand_still), seed)
     save(trace, path)
     return str(trace.meta["blame"])
+
+
+def _action(text: str) -> Any:
+    return np.array(text.split(","), np.float32) if "," in text else int(text)
 
 
 def summary(results: list[dict[str, Any]]) -> str:
@@ -150,23 +175,35 @@ def run(arguments: list[str] | None = None) -> None:
     """Play a campaign, or go on with it."""
     parser = argparse.ArgumentParser(prog="rss-shield stress", description="Look for an ego at fault, in the engine.")
     parser.add_argument("--envs", default=",".join(DEFAULT_ENVS), help="separated by commas")
-    parser.add_argument("--policies", default=",".join(POLICIES), help="separated by commas")
+    parser.add_argument("--policies", default=",".join(POLICIES), help=f"separated by commas; also {', '.join(FREE)}")
+    parser.add_argument("--traffic", default=STOCK, help=f"separated by commas: {STOCK}, {', '.join(HOSTILE)}, or all")
     parser.add_argument("--params", default="", help=f"presets, separated by commas: {', '.join(PRESETS)}")
     parser.add_argument("--shield", choices=("override", "monitor"), default="override")
     parser.add_argument("--episodes", type=int, default=1000, help="of each kind")
     parser.add_argument("--block", type=int, default=1000, help="episodes in a file")
     parser.add_argument("--seed", type=int, default=0, help="the first")
     parser.add_argument("--threads", type=int, default=1, help="of the engine")
+    parser.add_argument("--judged", action="store_true", help="judge every contact from the outside, too")
+    parser.add_argument("--go-on", action="store_true", help="write down what is found, and do not stop")
     parser.add_argument("--out", type=Path, default=Path("runs/stress"), help="folder of a campaign")
+    parser.add_argument("--write", type=Path, help="play nothing; write the page of what is there into this folder")
     options = parser.parse_args(arguments)
+    if options.write is not None:
+        try:
+            write_page(options.out, options.write, "rss-shield stress --write docs/results")
+        except ValueError as error:
+            sys.exit(f"rss-shield stress: {error}")
+        return
     if options.episodes < 1 or options.block < 1:
         sys.exit(
             f"rss-shield stress: --episodes {options.episodes} --block {options.block}: expected whole numbers >= 1"
         )
     envs, policies, presets = (text.split(",") for text in (options.envs, options.policies, options.params))
+    traffic = [STOCK, *HOSTILE] if options.traffic == "all" else options.traffic.split(",")
     options.out.mkdir(parents=True, exist_ok=True)
     results = []
-    for block in blocks_of(envs, policies, presets, options.shield, options.seed, options.episodes, options.block):
+    numbers = options.seed, options.episodes, options.block
+    for block in blocks_of(envs, policies, presets, options.shield, *numbers, traffic, options.judged):
         path = options.out / block.name
         if path.exists():
             result = json.loads(path.read_text(encoding="utf-8"))
@@ -178,7 +215,7 @@ def run(arguments: list[str] | None = None) -> None:
             write_json(path, result)
             print(f"{path.name}: {result['verdicts']}", flush=True)
         results.append(result)
-        if result["bad"]:
+        if result["bad"] and not options.go_on:
             _stop(block, result, path, results)
     print(summary(results))
 

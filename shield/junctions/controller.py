@@ -182,7 +182,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         dangerous, kept = judge_user(scene, i, samples[i], memory[i], a, known, trapped)
         pairs += dangerous
         broken += not kept
-    _note_who_trapped(plan, memory, trapped)
+    _note_who_trapped(plan, memory, trapped, trapped and _is_resolute(scene, a))
     anticipated = anticipated and a != limited
     changed = overrides and a != limited and not anticipated
     response = 0
@@ -204,10 +204,11 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
 
 
 @inner
-def _note_who_trapped(plan, memory, trapped):
+def _note_who_trapped(plan, memory, trapped, resolute):
     """Whoever broke a duty and so trapped the ego is to blame for contacts with those toward whom no plan is left.
 
-    They may have done nothing wrong, and the ego had to break its plans toward somebody (hole H24).
+    They may have done nothing wrong, and the ego had to break its plans toward somebody (hole H24): that it did is no
+    fault of its own, as long as it is `resolute`.
     """
     if not trapped:
         plan.wronged = False
@@ -215,6 +216,8 @@ def _note_who_trapped(plan, memory, trapped):
     for i in range(len(memory)):
         plan.wronged |= memory[i].was_lawless
     for i in range(len(memory)):
+        if plan.wronged and resolute and memory[i].since == 0 and memory[i].ego_broke == LEFT_NO_PLAN:
+            memory[i].ego_broke, memory[i].ego_excess = KEPT, 0.0
         if plan.wronged and memory[i].since == 1 and memory[i].other_broke == KEPT:
             memory[i].other_broke = TRAPPED
 
@@ -549,7 +552,8 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
 
     Returns:
       (dangerous, kept): is the ego not free toward this road user, and did it keep its duty? A contact is
-      judged more strictly: whoever left itself no plan toward the other is to blame, trapped or not.
+      judged more strictly: whoever left itself no plan toward the other is to blame, unless somebody's breach has
+      trapped it (`_note_who_trapped`).
     """
     _judge_motion(sample, memory, scene.table.other, scene.table.dt)
     memory.was_lawless = memory.other_broke != KEPT
@@ -636,8 +640,11 @@ def _judge_motion(sample, memory, other, dt):
 
 @inner
 def _leaves_paths(sample, memory):
-    """Has a road user gone where none of its ways leads? Who is off all of them has to come to rest, or come back."""
-    off = sample.astray and (not memory.astray or abs(sample.speed) > abs(memory.speed) + _JITTER)
+    """Has a road user gone where none of its ways leads? Who is off all of them is expected to stand, or to come back.
+
+    So whoever drives on there has left them anew on every sample, also one that has never been on any (J12).
+    """
+    off = sample.astray and not (memory.astray and abs(sample.speed) < STANDING)
     return off or sample.strays or sample.lanes & ~memory.lanes != 0
 
 

@@ -13,7 +13,7 @@ from rss_shield.shield.junctions.conflict_areas import cell_of
 from rss_shield.shield.junctions.controller import CROSSING, SAMPLE, judge_crossing
 from rss_shield.shield.junctions.plans import ANY, Track
 from rss_shield.shield.junctions.reach import THREAT, farthest
-from rss_shield.shield.verdicts import CUT_IN, DUTIES, INHERITED, KEPT, LEFT_NO_PLAN, OTHER, TOO_FAR, TOO_HARD
+from rss_shield.shield.verdicts import CUT_IN, DUTIES, INHERITED, KEPT, LEFT_NO_PLAN, NOBODY, OTHER, TOO_FAR, TOO_HARD
 from rss_shield.shield.verdicts import EGO as AT_FAULT
 
 EVERY_FRAME = {"policy_frequency": 15, "duration": 11 * 15}
@@ -23,6 +23,21 @@ def verdict_of(duel):
     sample = np.zeros(1, SAMPLE)
     sample["speed"] = duel.threats["v"]
     return judge_crossing(sample[0], duel.memory[0], False, TABLE.other, DT)
+
+
+# ---------------------------------------------------------------- off all ways
+
+
+@pytest.mark.parametrize(("speed", "verdict"), [(10.0, OTHER), (3.0, OTHER), (0.2, NOBODY)])
+def test_who_drives_on_where_no_way_leads_has_left_them_also_if_it_was_never_on_any(speed, verdict):
+    """A wrong-way driver is off all ways from first sight on (J12). One that stands is where plans expect it."""
+    sample, memory = np.zeros(1, SAMPLE)[0], np.zeros(1, CROSSING)[0]
+    sample["astray"] = memory["astray"] = True
+    sample["speed"] = memory["speed"] = speed
+    memory["age"], memory["items"], memory["since"] = 5, 1, 3
+    found = judge_crossing(sample, memory, False, TABLE.other, DT)
+    assert found.verdict == verdict
+    assert DUTIES[found.other_duty] == ("left every path it could take" if verdict == OTHER else "")
 
 
 # ---------------------------------------------------------------- flags

@@ -5,7 +5,7 @@ from typing import Any
 from rss_shield.envs.fast.draws import integers, uniform
 from rss_shield.envs.fast.rating import normalized, scaled, weigh
 from rss_shield.envs.fast.record import set_weights
-from rss_shield.envs.fast.spawning import add_ego, add_obstacle, add_vehicle
+from rss_shield.envs.fast.spawning import add_ego, add_obstacle, add_traffic
 from rss_shield.envs.fast.state import DIRECT
 from rss_shield.envs.roads.network import position
 from rss_shield.shield._numba.compiled import inner, part
@@ -41,7 +41,7 @@ def make_scene(cars, episode, lanes, config, target_speeds):
         lane = lanes[config.main_lane + integers(episode, 2)]
         x, y = position(lane, s + uniform(episode, -5.0, 5.0), 0.0)
         speed += uniform(episode, -1.0, 1.0)
-        add_vehicle(cars, episode, x, y, 0.0, speed, lanes, config)
+        add_traffic(cars, episode, x, y, 0.0, speed, lanes, config)
     add_from_ramp(cars, episode, 110.0, lanes, config)
 
 
@@ -49,7 +49,7 @@ def make_scene(cars, episode, lanes, config, target_speeds):
 def add_from_ramp(cars, episode, s, lanes, config):
     """Put the car that merges on the ramp, and the obstacle at its end."""
     x, y = position(lanes[config.side_lane], s, 0.0)
-    i = add_vehicle(cars, episode, x, y, 0.0, 20.0, lanes, config)
+    i = add_traffic(cars, episode, x, y, 0.0, 20.0, lanes, config)
     cars[i].target_speed = 30.0
     add_obstacle(cars, episode, lanes, config)
 

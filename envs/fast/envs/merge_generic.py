@@ -4,7 +4,7 @@ from typing import Any
 
 from rss_shield.envs.fast.draws import integers, uniform
 from rss_shield.envs.fast.envs import merge
-from rss_shield.envs.fast.spawning import add_ego, add_vehicle
+from rss_shield.envs.fast.spawning import add_ego, add_traffic
 from rss_shield.envs.roads.network import position
 from rss_shield.shield._numba.compiled import part
 
@@ -34,7 +34,7 @@ def make_scene(cars, episode, lanes, config, target_speeds):
             x, y = position(lane, uniform(episode, 0.0, config.main_length), 0.0)
             if _is_free(cars, episode, x, y):
                 speed = 30.0 + uniform(episode, -2.0, 2.0)
-                add_vehicle(cars, episode, x, y, 0.0, speed, lanes, config)
+                add_traffic(cars, episode, x, y, 0.0, speed, lanes, config)
                 break
     merge.add_from_ramp(cars, episode, 60.0, lanes, config)
 

@@ -107,9 +107,11 @@ SCENARIOS = (
         "the leader brakes harder than allowed",
         "25 m/s^2 from 1 s, gap 43 m. 41.375 + 62.5 tau - 39.06 tau^2 = 43 - 12.5 tau^2 at tau = 0.026, t = 1.03 "
         "s. It stops after 20^2 / 50 = 8 m: 51 m for the ego, which needs 0.1 20 + 20^2 / 8 = 52 m and more: "
-        "contact, but it has kept its response. Without the shield both have broken theirs.",
+        "contact, but it has kept its response. Without the shield both have broken theirs. "
+        "With evasion it brakes with 8 m/s^2 and stops after 20^2 / 16 = 25 m more.",
         (ego(), ahead(43.0, 20.0, from_second_one(-25.0))),
         *("both", "other"),
+        evaded="",
         partner="leader",
         danger=1.026,
         axis="longitudinal",
@@ -119,9 +121,11 @@ SCENARIOS = (
     Scenario(
         "the leader crashes: it stops on the spot",
         "200 m/s^2 from 1 s, gap 45 m: it stops within a frame or two, 2 m on, so there are 47 m and the ego needs "
-        "52 m. At 1.1 s D(20, 0) = 66.375 > 43 m; at 1 s 41.375 < 45 m.",
+        "52 m. At 1.1 s D(20, 0) = 66.375 > 43 m; at 1 s 41.375 < 45 m. "
+        "With evasion it brakes with 8 m/s^2: 25 m.",
         (ego(), ahead(45.0, 20.0, from_second_one(-200.0))),
         *("both", "other"),
+        evaded="",
         partner="leader",
         danger=1.0,
         axis="longitudinal",
@@ -273,6 +277,46 @@ SCENARIOS = (
         response="longitudinal",
         kind="backing up",
     ),
+    Scenario(
+        "an object on the road",
+        "It is 1 m long and lies 100 m ahead. As with a stalled car D(20, 0) = 66.375 m is left after 1.68 s.",
+        (ego(), ahead(100.0, 0.0, name="object", length=1.0)),
+        *("ego", ""),
+        partner="object",
+        danger=1.681,
+        axis="longitudinal",
+        response="longitudinal",
+        kind=FOLLOWING,
+    ),
+    Scenario(
+        "the leader pulls over and stops",
+        "3 m/s^2 and 1 m/s to the right from 1 s on. gap = 50 - 1.5 tau^2, D = 66.375 - (20 - 3 tau)^2 / 16 = 41.375 + "
+        "7.5 tau - 0.5625 tau^2: 0.9375 tau^2 + 7.5 tau = 8.625 at tau = 1.02, t = 2.02 s, 1 m to the side by then. An "
+        "ego that goes on is there when 1.5 tau^2 = 50, tau = 5.8, and the other out of its lane since tau = 4.",
+        (ego(), ahead(50.0, 20.0, from_second_one(-3.0), ((1.0, 5.0, 1.0),))),
+        *("", ""),
+        partner="leader",
+        danger=2.019,
+        axis="longitudinal",
+        response="longitudinal",
+        kind=FOLLOWING,
+    ),
+    Scenario(
+        "secondary hit: the leader runs into a stalled car",
+        "The leader is 60 m ahead at 20 m/s, the stalled car 35 m before it: they touch at 1.75 s, and a wreck may "
+        "stop on "
+        "the spot: D(20, 0) = 66.375 > 60 m at once. Here it slides, losing its speed by e every second, 20 m in all. "
+        "With the shield the ego needs 52 m from 1.8 s on, and has 60 m and more. Without it touches, after 80 m at "
+        "5.8 "
+        "s: it has not braked, and the leader stopped shorter than with 8 m/s^2.",
+        (ego(), ahead(60.0, 20.0), ahead(100.0, 0.0, name="stalled")),
+        *("both", ""),
+        partner="leader",
+        danger=1.75,
+        axis="longitudinal",
+        response="longitudinal",
+        kind=FOLLOWING,
+    ),
     # ------------------------------------------------------------ somebody behind
     Scenario(
         "rear-ended while standing",
@@ -300,9 +344,12 @@ SCENARIOS = (
     Scenario(
         "the ego brakes and its follower does not",
         "60 m > D'(20, 20) = 57.5 m. The ego brakes with 8 m/s^2 from 1 s: 57.5 + 20 tau - 4 tau^2 = 60 - 4 tau^2 "
-        "at tau = 0.125, t = 1.13 s. It may brake so; the follower, which goes on, is there after 85 / 20 = 4.25 s.",
+        "at tau = 0.125, t = 1.13 s. It may brake so; the follower, which goes on, is there after 85 / 20 = 4.25 s. "
+        "With evasion it does not go on braking once it is in danger: speeding up with 2 m/s^2 it has what it lost, "
+        "1.6 m/s and 0.6 m of 60 m by then, back within a second.",
         (ego(phases=from_second_one(-8.0)), behind(60.0, 20.0)),
         *("other", "other"),
+        evaded="",
         partner="follower",
         danger=1.125,
         axis="longitudinal",
@@ -323,9 +370,11 @@ SCENARIOS = (
     ),
     Scenario(
         "a faster car comes up behind",
-        "30 m/s, 150 m behind. D'(30, 20) = 31 + 128 - 25 + 1 = 135 m is left after 15 / 10 = 1.5 s; touched at 15 s.",
+        "30 m/s, 150 m behind. D'(30, 20) = 31 + 128 - 25 + 1 = 135 m is left after 15 / 10 = 1.5 s; touched at 15 s. "
+        "With evasion it speeds up with 2 m/s^2: it is as fast 5 s later, for which 25 m of 135 m go.",
         (ego(), behind(150.0, 30.0)),
         *("other", "other"),
+        evaded="",
         partner="follower",
         danger=1.5,
         axis="longitudinal",
@@ -400,9 +449,12 @@ SCENARIOS = (
         "3 m ahead, 2 m/s across from 1 s on, 8 m/s^2 from 1.5 s on. The ego brakes from 1.1 s on and drives 18.4 "
         "m/s at 1.5 s, 3.3 m behind; 1.6 m/s slower, but it loses 4 m/s each second: 3.3 + 1.6 tau - 2 tau^2 = 0 "
         "at tau = 1.75, in its lane by then. It kept its response. Without the shield the contact is at 2.4 s, 0.9 "
-        "s after braking was owed.",
+        "s after braking was owed. "
+        "With evasion it brakes with 8 m/s^2 from 1.1 s on, is 3.2 m/s slower at 1.5 s and stays slower, so the gap "
+        "grows.",
         (ego(), ahead(3.0, 20.0, ((1.5, 0.0), (FOREVER, -8.0)), ((1.0, 3.0, 2.0),), LEFT, "cutter")),
         *("both", "other"),
+        evaded="",
         partner="cutter",
         danger=1.0,
         axis="lateral",
@@ -449,9 +501,11 @@ SCENARIOS = (
         "the neighbour drifts over",
         "0.3 m/s from 1 s on, 1 m behind: it needs E'(0.3) + E(0) + 0.35 = 0.87 + 0.09 + 0.35 = 1.31 m, and 1.51 - "
         "0.3 tau is left: tau = 0.67, t = 1.67 s. It touches at 2 m / 0.3 = 6.7 s later. The ego keeps its lane: "
-        "that is all it owes.",
+        "that is all it owes. "
+        "With evasion it drops behind: 6 m at 4 m/s^2 take sqrt(12 / 4) = 1.7 s, long before the 6.7 s.",
         (ego(), Car("neighbour", LEFT, -1.0, 20.0, sideways=((1.0, 12.0, 0.3),))),
         *("other", "other"),
+        evaded="",
         partner="neighbour",
         danger=1.67,
         axis="lateral",
@@ -473,9 +527,11 @@ SCENARIOS = (
     Scenario(
         "both drift toward each other",
         "0.3 m/s each from 1 s on: 0.36 + 0.87 + 0.35 = 1.58 > 1.51 m at once. Without the shield both, with it "
-        "the other alone.",
+        "the other alone. "
+        "With evasion it drops behind, within 1.7 s as above; 2 m across take 6.7 s.",
         (ego(sideways=((1.0, 12.0, -0.3),)), Car("neighbour", LEFT, -1.0, 20.0, sideways=((1.0, 12.0, 0.3),))),
         *("both", "other"),
+        evaded="",
         partner="neighbour",
         danger=1.0,
         axis="lateral",
@@ -485,13 +541,15 @@ SCENARIOS = (
     Scenario(
         "squeezed from both sides",
         "Neighbours on either side drift over as the one above: t = 1.67 s with each. No duty toward one "
-        "contradicts the other: the ego keeps its lane.",
+        "contradicts the other: the ego keeps its lane. "
+        "With evasion it drops behind both within 1.7 s.",
         (
             ego(),
             Car("left", LEFT, -1.0, 20.0, sideways=((1.0, 12.0, 0.3),)),
             Car("right", RIGHT, -1.0, 20.0, sideways=((1.0, 12.0, -0.3),)),
         ),
         *("other", "other"),
+        evaded="",
         partner="left",
         danger=1.67,
         axis="lateral",

@@ -71,10 +71,16 @@ class Scenario:
     danger: float | None = None  # when [s]; None = never
     axis: str = ""  # that was safe last
     response: str = ""  # that is owed on the first dangerous sample
+    evaded: str | None = None  # verdict with evasive effort besides, where that is another than with the shield
     literal: str | None = None  # verdict under Def. 10 as printed, where that is another
     seconds: float = 10.0  # that are played
     lanes: tuple[tuple[float, bool], ...] = ((0.0, False), (4.0, False), (8.0, False))  # middle [m], runs the other way
     kind: str = ""  # of situation, by the catalogues
+
+    @property
+    def evading(self) -> str:
+        """Verdict with evasive effort."""
+        return self.on if self.evaded is None else self.evaded
 
 
 class Result(NamedTuple):
@@ -130,19 +136,20 @@ class Stage:
         return self
 
 
-def play(scenario: Scenario, shield: bool, rules: Rules = RULES) -> Result:
+def play(scenario: Scenario, shield: bool, rules: Rules = RULES, evasion: bool = False) -> Result:
     """Play a scenario.
 
     Args:
       scenario: `Scenario`.
       shield: does it act, or watch only?
       rules: in force.
+      evasion: does it make an evasive effort?
     """
     road = Road(network=_network(scenario), vehicles=[], np_random=np.random.RandomState(0))
     cars = [_car(road, car) for car in scenario.cars]
     road.vehicles = list(cars)
     ego = cars[0]
-    guard = ShieldedEgo(ego, Settings(Table(EGO, OTHER, rules, DT), shield, LANES))
+    guard = ShieldedEgo(ego, Settings(Table(EGO, OTHER, rules, DT), shield, LANES, evasion=evasion))
     guard.is_ego = True
     stage: Any = Stage(road, [ego])
     film = Film(stage)
