@@ -37,6 +37,7 @@ SLOW = frozenset(
         "envs/test_standing",
         "envs/test_stock",
         "envs/test_taken_back",
+        "envs/test_understood",
         "envs/test_wrapper",
         "eval/test_backends",
         "eval/test_judge_risk",
