@@ -238,14 +238,22 @@ def _check_free_driving(action_type: ContinuousAction, env: Any) -> None:
     if lowest > 0.0:
         raise ValueError(f"action option speed_range starts at {lowest:g} m/s: expected <= 0, or nobody could stop")
     if scheme_of(env) == LANES:
-        if action_type.dynamical:
-            raise ValueError("action option dynamical = True is supported at intersections only; expected False")
+        if action_type.dynamical and not _is_alone(env):
+            raise ValueError(
+                "action option dynamical = True is not supported along lanes where somebody else is, because a car "
+                "whose tyres slip cannot end its sideways motion within a frame; expected False"
+            )
         return
     if not destination_of(env):
         raise ValueError(
             f"config destination = {env.config['destination']!r}: expected a node such as 'o1', because a car that is "
             "steered freely has to declare its route"
         )
+
+
+def _is_alone(env: Any) -> bool:
+    """Is nobody else on the road, nor ever will be?"""
+    return isinstance(env, LaneKeepingEnv) and len(env.road.vehicles) + len(env.road.objects) == 1
 
 
 def destination_of(env: Any) -> str | None:
@@ -285,6 +293,8 @@ def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dic
             "roads cross, because plans look at single frames"
         )
     if scheme == PLANS:  # the paths hold everybody's width at any speed, so lateral speeds need no limit
+        rules = rules._replace(limits=False)
+    if isinstance(env, LaneKeepingEnv):  # whose tyres slip, which the limits of lateral motion do not know
         rules = rules._replace(limits=False)
     _check_distances(scheme, conduct)
     if conduct["filter"].kind != RSS:  # nothing that is the shield's own acts beside another filter
