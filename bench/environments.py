@@ -68,8 +68,8 @@ def _cases() -> dict[str, Case]:
     cases["racetrack-v0-throttle"] = Case("racetrack-v0", TRACK | BUSY | CONTINUOUS, "12 s, throttle and steering")
     for env_id in ("roundabout-v0", "signalised-intersection-v0"):
         cases[f"{env_id}-continuous"] = Case(env_id, CONTINUOUS, "continuous actions")
-    for env_id in ("highway-v0", "merge-v0"):
-        cases[f"{env_id}-agents"] = Case(env_id, AGENTS, "three agents")
+    cases["highway-v0-agents"] = Case("highway-v0", AGENTS | {"vehicles_count": 15}, "three agents among 15 cars")
+    cases["merge-v0-agents"] = Case("merge-v0", AGENTS, "three agents")
     return cases
 
 
