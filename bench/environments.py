@@ -44,6 +44,10 @@ AGENTS = {
 # scripted drivers see nothing, so whatever is quick to compute is observed; 300 s on a racetrack are 1500 decisions
 TRACK = {"observation": {"type": "Kinematics"}, "duration": 12}
 BUSY = {"other_vehicles": 8}
+SLIPPING = {
+    "action": {"type": "ContinuousAction", "dynamical": True},
+    **{"simulation_frequency": 60, "duration": 10, "vehicles_count": 12, "vehicles_density": 2},
+}
 
 
 class Case(NamedTuple):
@@ -66,6 +70,7 @@ def _cases() -> dict[str, Case]:
     blocked = {"block_lane": True, "force_decision": True}
     cases["racetrack-oval-v0-blocked"] = Case("racetrack-oval-v0", TRACK | BUSY | blocked, "12 s, lanes blocked")
     cases["racetrack-v0-throttle"] = Case("racetrack-v0", TRACK | BUSY | CONTINUOUS, "12 s, throttle and steering")
+    cases["highway-v0-slipping"] = Case("highway-v0", SLIPPING, "tyres that slip, 12 cars, 60 Hz, 10 s")
     for env_id in ("roundabout-v0", "signalised-intersection-v0"):
         cases[f"{env_id}-continuous"] = Case(env_id, CONTINUOUS, "continuous actions")
     cases["highway-v0-agents"] = Case("highway-v0", AGENTS | {"vehicles_count": 15}, "three agents among 15 cars")
@@ -101,8 +106,9 @@ these agents may do is a `config`: `action` is
 
 {actions}
 
-and *two agents* have `controlled_vehicles` 2 and the environment's own action for each. Which of them are driven
-without blame: [results](results/environments.md). A road of your own: [how-to](howtos.md#a-road-of-your-own).
+(*tyres that slip* with `simulation_frequency` 60: along lanes frames longer than 1/56 s are refused), and *two
+agents* have `controlled_vehicles` 2 and the environment's own action for each. Which of them are driven without
+blame: [results](results/environments.md). A road of your own: [how-to](howtos.md#a-road-of-your-own).
 
 On racetracks an agent that only steers has no say in its speed: the shield brakes for it, and brings it back to the
 speed of the environment when nothing forbids that. `lane-keeping-v0` has nobody else on the road, so nothing is owed

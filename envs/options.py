@@ -17,6 +17,7 @@ from highway_env.envs.two_way_env import TwoWayEnv
 from highway_env.envs.u_turn_env import UTurnEnv
 
 from rss_shield.envs.arguments import number, preset_of, rules_of
+from rss_shield.envs.roads.bicycle import longest_frame
 from rss_shield.envs.stock import LOWEST_FREQUENCY, check_frequencies
 from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
 from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
@@ -238,10 +239,11 @@ def _check_free_driving(action_type: ContinuousAction, env: Any) -> None:
     if lowest > 0.0:
         raise ValueError(f"action option speed_range starts at {lowest:g} m/s: expected <= 0, or nobody could stop")
     if scheme_of(env) == LANES:
-        if action_type.dynamical and not _is_alone(env):
+        frequency, lowest = env.config["simulation_frequency"], 1 / longest_frame()
+        if action_type.dynamical and frequency < lowest and not _is_alone(env):
             raise ValueError(
-                "action option dynamical = True is not supported along lanes where somebody else is, because a car "
-                "whose tyres slip cannot end its sideways motion within a frame; expected False"
+                f"action option dynamical = True with config simulation_frequency = {frequency}: expected >= "
+                f"{lowest:.0f} along lanes, because longer frames make a slow car whose tyres slip swing about"
             )
         return
     if not destination_of(env):

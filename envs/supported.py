@@ -22,6 +22,7 @@ ACTIONS: dict[str, dict[str, Any]] = {  # how an agent may act: configuration of
     "tyres that slip": {"type": "ContinuousAction", "dynamical": True},
 }
 AGENTS = "two agents"
+SLIPPING, HERTZ = "tyres that slip", 60  # tried with frames as short as they need along lanes
 OBSERVATIONS: dict[str, dict[str, Any]] = {
     "Kinematics": {"type": "Kinematics"},
     "TimeToCollision": {"type": "TimeToCollision"},
@@ -65,10 +66,11 @@ def _configs(env_id: str) -> dict[str, Mapping[str, Any] | None]:
     agent = default["action"].get("action_config", default["action"])
     # times to collision are read off meta-actions only
     changes = {"observation": {"type": "Kinematics"}} if default["observation"]["type"] == "TimeToCollision" else {}
-    one: dict[str, Mapping[str, Any] | None] = {}
+    one: dict[str, dict[str, Any]] = {}
     for name, action in ACTIONS.items():
         kept = agent if agent["type"] == action["type"] == "DiscreteMetaAction" else {}  # its target speeds
         one[name] = {"action": {**kept, **action}} | ({} if name == "meta-actions" else changes)
+        one[name] |= {"simulation_frequency": HERTZ} if name == SLIPPING else {}
     several = {
         "controlled_vehicles": 2,
         "action": {"type": "MultiAgentAction", "action_config": dict(agent)},

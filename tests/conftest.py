@@ -36,6 +36,7 @@ SLOW = frozenset(
         "envs/test_signalised",
         "envs/test_standing",
         "envs/test_stock",
+        "envs/test_sliding",
         "envs/test_supported",
         "envs/test_taken_back",
         "envs/test_tracks",

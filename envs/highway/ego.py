@@ -184,7 +184,7 @@ class ShieldedEgo:
         steering = float(nominal["steering"])  # single precision where the agent's action is
         self._meet()
         users, ego, bend = self._sense()
-        wish = Command(self._throttle(nominal), float(slip_of(steering)))
+        wish = self._command(self._throttle(nominal), steering)
         danger = find_danger(ego, users, *self.last, self.memory, settings.table)
         self.rooms = danger.room_left, danger.room_right
         response = Response(wish, False, False, False)
@@ -196,7 +196,7 @@ class ShieldedEgo:
         steered = steering
         if command != wish:
             if command.slip != wish.slip:
-                steered = float(steering_of(command.slip))
+                steered = self._steering_for(command)
             vehicle.action = {"steering": steered, "acceleration": command.acceleration}
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
@@ -215,6 +215,14 @@ class ShieldedEgo:
         if self.record is not None:
             seen = ego, users, bend.curvature, tuple(self.jumped), *before
             self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
+
+    def _command(self, acceleration: float, steering: float) -> Command:
+        """What the lane frame sees of a command: the slip acts at once."""
+        return Command(acceleration, float(slip_of(steering)))
+
+    def _steering_for(self, command: Command) -> float:
+        """Steering angle that a command takes [rad]."""
+        return float(steering_of(command.slip))
 
     def _throttle(self, nominal) -> float:
         """What the agent's own controller asks for [m/s^2]; where it has none, the speed of the environment again."""

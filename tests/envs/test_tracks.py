@@ -92,7 +92,7 @@ def test_lane_keeping_is_left_as_it_is_because_nobody_else_is_there():
         second, with_shield, *_, info = shielded.step(action)
         assert reward == with_shield and not info["shield"]["intervened"] and info["episode_dangerous_pairs"] == 0
     shielded.unwrapped.road.vehicles.append(type(shielded.unwrapped.vehicle)(shielded.unwrapped.road, [0.0, 0.0]))
-    with pytest.raises(ValueError, match="dynamical = True is not supported along lanes where somebody else is"):
+    with pytest.raises(ValueError, match="dynamical = True with config simulation_frequency = 10: expected >= 56"):
         shielded.step(action)
 
 
