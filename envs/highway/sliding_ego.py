@@ -14,24 +14,38 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.bicycle import across, frame_across, steer_along
 from rss_shield.shield.command import Command
-from rss_shield.shield.lanes.controller import Bounds, Response, restrict
+from rss_shield.shield.filters.answer import FILTERS
+from rss_shield.shield.lanes.controller import Response, restrict
+from rss_shield.shield.lanes.correction import CORRECTIONS
+from rss_shield.shield.lanes.memory import Bounds
 
 FLUCTUATION = 0.02  # speeds across the lane below this are none (Def. 5): tyres come to rest gradually [m/s]
-SLIDES_OUT = (
-    0.15  # likewise where steering has no effect any more; it is over within centimetres, for which mu is there
-)
+SLIDES_OUT = 0.15  # likewise where steering has no effect: it is over within centimetres, for which mu is there [m/s]
 _STEERS = 1.0  # from this speed on steering has an effect [m/s]
 _CREEPS = 0.1  # who is slower has no course [m/s]
 
 
 class SlidingEgo(ShieldedEgo):
-    """`ShieldedEgo` on a `BicycleVehicle`."""
+    """`ShieldedEgo` on a `BicycleVehicle`.
+
+    Args:
+      vehicle, settings, record: see `ShieldedEgo`.
+
+    Raises:
+      ValueError: another filter, or the proper response in full: both steer by slip.
+    """
 
     def __init__(self, vehicle: Any, settings: Settings, record: bool = False) -> None:
+        for name, index, known in (
+            ("filter", settings.filter.kind, FILTERS),
+            ("correction", settings.correction, CORRECTIONS),
+        ):
+            if index != 0:
+                raise ValueError(f"{name} = {known[index]!r}: expected {known[0]!r} with dynamical = True along lanes")
         super().__init__(vehicle, settings, record)
         self.backs_up = False  # in reverse its tyres push it round
-        self.steered = 0.0
-        self.bend = 0.0
+        self.steered = 0.0  # steering angle of the last command [rad]
+        self.bend = 0.0  # curvature under the ego [1/m]
 
     def _state(self) -> np.ndarray:
         vehicle = self.vehicle

@@ -151,3 +151,9 @@ def test_the_audit_of_the_record_counts_what_the_shield_counted():
 def test_longer_frames_are_refused_where_somebody_is():
     with pytest.raises(ValueError, match=r"dynamical = True with config simulation_frequency = 15: expected >= 56"):
         make("highway-v0", config=DYNAMICAL | {"simulation_frequency": 15})
+
+
+@pytest.mark.parametrize(("option", "value"), [("filter", "ttc"), ("correction", "response")])
+def test_what_steers_by_slip_is_refused(option, value):
+    with pytest.raises(ValueError, match=f"{option} = '{value}': expected '(rss|nearest)' with dynamical = True"):
+        make("highway-v0", config=DYNAMICAL | {"vehicles_count": 1}, **{option: value})
