@@ -62,7 +62,8 @@ def probe(env_id: str) -> Row:
 
 def _configs(env_id: str) -> dict[str, Mapping[str, Any] | None]:
     """Configurations to try; None = none is passed."""
-    default = make_stock(env_id).unwrapped.config
+    base: Any = make_stock(env_id).unwrapped
+    default = base.config
     agent = default["action"].get("action_config", default["action"])
     # times to collision are read off meta-actions only
     changes = {"observation": {"type": "Kinematics"}} if default["observation"]["type"] == "TimeToCollision" else {}
@@ -81,7 +82,7 @@ def _configs(env_id: str) -> dict[str, Mapping[str, Any] | None]:
 
 def _step(env_id: str, config: Mapping[str, Any] | None) -> None:
     """One decision behind the shield on highway-env."""
-    given = {} if config is None else {"config": dict(config)}
+    given: dict[str, Any] = {} if config is None else {"config": dict(config)}
     try:
         bare = make_stock(env_id, **given)
         bare.action_space.seed(0)
