@@ -9,14 +9,16 @@ from highway_env.envs.common.action import ContinuousAction, DiscreteMetaAction,
 from highway_env.envs.exit_env import ExitEnv
 from highway_env.envs.highway_env import HighwayEnv
 from highway_env.envs.intersection_env import IntersectionEnv
+from highway_env.envs.lane_keeping_env import LaneKeepingEnv
 from highway_env.envs.merge_env import MergeEnv
+from highway_env.envs.racetrack_env import RacetrackEnv
 from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
 from highway_env.envs.u_turn_env import UTurnEnv
 
 from rss_shield.envs.arguments import number, preset_of, rules_of
+from rss_shield.envs.roads.bicycle import longest_frame
 from rss_shield.envs.stock import LOWEST_FREQUENCY, check_frequencies
-from rss_shield.envs.worlds.signalised import SignalisedIntersectionEnv
 from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
 from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
@@ -34,12 +36,14 @@ TRAFFIC = ("stock", "compliant")  # how everybody else drives
 PENALTIES = ("response", "change")  # what an intervention penalty is charged for
 REPLACES = ("frame", "decision")  # what an action that is not permitted is replaced on
 SUPPORTED = (
-    "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
-    "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
+    "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, merge-generic-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, "
+    "racetrack-v0/-v1, racetrack-large-v0/-v1, racetrack-oval-v0/-v1, lane-keeping-v0, roundabout-v0/-v1, "
+    "roundabout-generic-v0/-v1, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, "
+    "signalised-intersection-v0"
 )
 Params = str | Preset | Sequence[RSSParams] | Mapping[str, Any] | None  # see `ShieldWrapper`
 _SCHEMES = {
-    **dict.fromkeys((HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv, UTurnEnv), LANES),
+    **dict.fromkeys((HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv, UTurnEnv, RacetrackEnv, LaneKeepingEnv), LANES),
     RoundaboutEnv: PLANS,
     IntersectionEnv: PLANS,
 }
@@ -240,19 +244,33 @@ def _check_free_driving(action_type: ContinuousAction, env: Any) -> None:
     if lowest > 0.0:
         raise ValueError(f"action option speed_range starts at {lowest:g} m/s: expected <= 0, or nobody could stop")
     if scheme_of(env) == LANES:
-        if action_type.dynamical:
-            raise ValueError("action option dynamical = True is supported at intersections only; expected False")
+        frequency, lowest = env.config["simulation_frequency"], 1 / longest_frame()
+        if action_type.dynamical and frequency < lowest and not _is_alone(env):
+            raise ValueError(
+                f"action option dynamical = True with config simulation_frequency = {frequency}: expected >= "
+                f"{lowest:.0f} along lanes, because longer frames make a slow car whose tyres slip swing about"
+            )
         return
-    if not isinstance(env, IntersectionEnv) or isinstance(env, SignalisedIntersectionEnv):
-        raise ValueError(
-            f"action type {type(action_type).__name__} is not supported on {type(env).__name__}, because a car that is "
-            "steered freely may leave its route there; expected DiscreteMetaAction"
-        )
-    if not env.config["destination"]:
+    if not destination_of(env):
         raise ValueError(
             f"config destination = {env.config['destination']!r}: expected a node such as 'o1', because a car that is "
             "steered freely has to declare its route"
         )
+
+
+def _is_alone(env: Any) -> bool:
+    """Is nobody else on the road, nor ever will be?"""
+    return isinstance(env, LaneKeepingEnv) and len(env.road.vehicles) + len(env.road.objects) == 1
+
+
+def destination_of(env: Any) -> str | None:
+    """Node to which a car that is steered freely goes: the one of the configuration, or of highway-env's own ego."""
+    return env.config.get("destination", "nxs" if isinstance(env, RoundaboutEnv) else None)
+
+
+def keeps_speed(env: Any, action_type: Any) -> bool:
+    """Has the agent no say in the speed of its car, on a road on which there is one to keep?"""
+    return isinstance(env, RacetrackEnv) and isinstance(action_type, ContinuousAction) and not action_type.longitudinal
 
 
 def check_replace(options: Options, env: Any) -> None:
@@ -282,6 +300,8 @@ def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dic
             "roads cross, because plans look at single frames"
         )
     if scheme == PLANS:  # the paths hold everybody's width at any speed, so lateral speeds need no limit
+        rules = rules._replace(limits=False)
+    if isinstance(env, LaneKeepingEnv):  # whose tyres slip, which the limits of lateral motion do not know
         rules = rules._replace(limits=False)
     _check_distances(scheme, conduct)
     if conduct["filter"].kind != RSS:  # nothing that is the shield's own acts beside another filter

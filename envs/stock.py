@@ -6,10 +6,13 @@ from typing import Any
 
 import gymnasium as gym
 import highway_env  # noqa: F401  registers the environments
+import numpy as np
 from gymnasium.wrappers import TimeLimit
 from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.envs.common.action import MultiAgentAction
 from highway_env.envs.intersection_env import IntersectionEnv
+from highway_env.envs.merge_env import MergeEnv
+from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.utils import class_from_path
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
@@ -37,7 +40,7 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
         kwargs["max_episode_steps"] = whole("max_episode_steps", kwargs["max_episode_steps"], 1)
     with suppress(Exception):  # `gymnasium.make` complains; a class that exists before is left as it is
         class_from_path(kwargs["config"]["other_vehicles_type"])
-    with drivers_unchanged():
+    with drivers_unchanged(), _rewards_of_any_action():
         env = _made(env_id, kwargs)
         unwrapped: Any = env.unwrapped
         if not isinstance(unwrapped, AbstractEnv):
@@ -66,6 +69,28 @@ def _made(env_id: str, arguments: dict[str, Any]) -> gym.Env:
             raise ValueError(
                 f"config simulation_frequency = {frequency}: expected >= {LOWEST_FREQUENCY} where roads cross"
             ) from None
+
+
+@contextmanager
+def _rewards_of_any_action():
+    """Inside, merges and roundabouts can be made with continuous actions: their rewards ask which meta-action it is."""
+    saved = {kind: vars(kind)["_rewards"] for kind in (MergeEnv, RoundaboutEnv)}
+
+    def tolerant(kind):
+        return lambda env, action: saved[kind](env, _meta(action))
+
+    for kind in saved:
+        kind._rewards = tolerant(kind)
+    try:
+        yield
+    finally:
+        for kind, rewards in saved.items():
+            kind._rewards = rewards
+
+
+def _meta(action: Any) -> Any:
+    """A meta-action, or None for several numbers, which are none."""
+    return None if np.size(action) > 1 else action
 
 
 def check_frequencies(config: dict) -> None:
@@ -139,6 +164,8 @@ class Upkeep:
             env._spawn_vehicle = self.spawn_vehicle
         if not _has_duration(env):
             env._is_truncated = self.is_truncated
+        if isinstance(env, (MergeEnv, RoundaboutEnv)):
+            env._rewards = self.rewards
         if self._missing_agents() > 0:
             env.reset()
 
@@ -165,6 +192,9 @@ class Upkeep:
     def is_truncated(self) -> bool:
         overdue = self.env.time >= self.env.config.get("duration", float("inf"))
         return bool(overdue or type(self.env)._is_truncated(self.env))
+
+    def rewards(self, action: Any) -> dict[str, float]:
+        return type(self.env)._rewards(self.env, _meta(action))
 
     # -- agents
 

@@ -28,6 +28,7 @@ SCRIPTS = {
     "own_algorithm": "broken duties and faults 0",
     "own_simulator": "with the shield: smallest gap",
     "intersection": "routes known: 2 of 2 arrived, the ego at fault in 0",
+    "own_road": "override: blame nobody, nobody, nobody, nobody",
     "parameters_and_rules": "an ablation, judged in full: blame ego",
     "judge_a_log": "5.50 s: contact of ego and other, at fault: ego; ego braked less than the proper response asks",
     "baseline": "the shield: at fault in 0 of 5",

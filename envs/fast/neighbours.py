@@ -11,7 +11,7 @@ import numpy as np
 
 from rss_shield.envs.fast.state import OBSTACLE
 from rss_shield.envs.options import Settings
-from rss_shield.envs.roads.lanes import reach_of, road_through
+from rss_shield.envs.roads.lanes import reach_of, road_through, turned_round
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
 from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
@@ -45,9 +45,9 @@ POSE = np.dtype(
 class LaneFrames(NamedTuple):
     """What the shield measures by where distances along lanes keep the ego safe. L lanes."""
 
-    pieces: np.ndarray  # `[P, 11]` pieces of the roads through all lanes
-    start: np.ndarray  # `[L + 1]` where the road through each lane starts among the pieces
-    same: np.ndarray  # `[L, L]` no gap jumps between the two frames
+    pieces: np.ndarray  # `[P, 11]` pieces of the roads through all lanes, then of the same roads turned round
+    start: np.ndarray  # `[2 L + 1]` where each road starts among the pieces
+    same: np.ndarray  # `[2 L, 2 L]` no gap jumps between the two frames
 
 
 class Past(NamedTuple):
@@ -70,8 +70,17 @@ def compile_lane_frames(network, settings: Settings) -> LaneFrames:
     """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`: one each, because its lanes do not fork."""
     reach = reach_of(settings.table.ego, settings.table.other, settings.table.dt)
     lanes = [road_through(network, index, reach) for index in network.lanes_dict()]
-    same = np.array([[same_frame(a, b) for b in lanes] for a in lanes])
-    return LaneFrames(np.concatenate(lanes), np.cumsum([0, *map(len, lanes)]), same)
+    roads = lanes + [turned_round(road) for road in lanes]
+    same = np.array([[same_frame(a, b) for b in roads] for a in roads])
+    return LaneFrames(np.concatenate(roads), np.cumsum([0, *map(len, roads)]), same)
+
+
+@inner
+def road_under(ego, index, lanes, sight):
+    """Row of the road that the ego is measured along: that of its lane, or turned round if it drives against that."""
+    s = sight.s[ego.lane, index]
+    against = np.cos(ego.heading - heading_at(lanes[ego.lane], s)) < 0.0
+    return ego.lane + len(lanes) if against else ego.lane
 
 
 def no_lane_frames() -> LaneFrames:
@@ -95,7 +104,7 @@ def start_past(episode, past, blank):
     for i in range(len(past.memory)):
         past.memory[i] = blank[0]
         past.trail[0, i].x = past.trail[0, i].y = np.nan
-    episode.frame_lane, episode.turn, episode.near = -1, 0, 0
+    episode.frame_road, episode.turn, episode.near = -1, 0, 0
     if len(past.memory) > 0:  # there is a shield
         _mark_all(episode, past)
 
@@ -135,10 +144,11 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     """
     frames, past, ego, dt = distances.frames, distances.past, cars[episode.ego], settings.table.dt
     episode.turn = _row(episode, 1)
-    lane_before, jumps = _choose_frame(episode, distances, ego.lane)
+    under = road_under(ego, episode.ego, lanes, sight)
+    under_before, jumps = _choose_frame(episode, distances, under)
     now, before, earlier = past.trail[episode.turn], past.trail[row_before(episode)], past.trail[_row(episode, 1)]
-    road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
-    road_before = frames.pieces[frames.start[lane_before] : frames.start[lane_before + 1]]
+    road = frames.pieces[frames.start[under] : frames.start[under + 1]]
+    road_before = frames.pieces[frames.start[under_before] : frames.start[under_before + 1]]
     if jumps:
         _start_again(episode, past, road, before, earlier, boxes[0], dt)
         road_before = road
@@ -192,13 +202,13 @@ def row_before(episode):
 
 
 @inner
-def _choose_frame(episode, distances, lane):
-    """Measure along the lane the ego is on: (the one before, do gaps jump with it?)."""
-    before = episode.frame_lane
-    episode.frame_lane = lane
+def _choose_frame(episode, distances, under):
+    """Measure along the road under the ego: (the one before, do gaps jump with it?)."""
+    before = episode.frame_road
+    episode.frame_road = under
     if before < 0:
-        return lane, False
-    return before, lane != before and not distances.frames.same[before, lane]
+        return under, False
+    return before, under != before and not distances.frames.same[before, under]
 
 
 @rare

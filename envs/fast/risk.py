@@ -184,7 +184,7 @@ def _mark(ego, lanes, eta, sight):
 def _look_along_lane(cars, episode, lanes, sight, distances, meter):
     """Whoever is nearest ahead and behind in the ego's lane and beside it, or concerns its lane change."""
     ego, frames, past, n = cars[episode.ego], distances.frames, distances.past, episode.cars - 1
-    road = frames.pieces[frames.start[ego.lane] : frames.start[ego.lane + 1]]
+    road = frames.pieces[frames.start[episode.frame_road] : frames.start[episode.frame_road + 1]]
     now, before = past.trail[episode.turn], past.trail[row_before(episode)]
     for i in range(n):
         k = car_of(i, episode)

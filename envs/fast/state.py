@@ -78,7 +78,7 @@ EPISODE = np.dtype(
         ("road_frames", "i8"),  # since the road was made, on roads that are regulated
         ("overflow", "?"),  # a car found no room in the arrays
         # the shield on the ego
-        ("frame_lane", "i8"),  # lane it measures along, -1 = none yet
+        ("frame_road", "i8"),  # road it measures along, see `LaneFrames`, -1 = none yet
         ("path", "i8"),  # through the junction, -1 = none yet
         ("go", "i8"),  # frames of throttle left in its plan through a junction, -1 = no plan
         ("held_at", "f8"),  # acceleration to which it was held back on the last frame, inf = it was not [m/s^2]

@@ -8,7 +8,7 @@ from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
 from highway_env.vehicle.objects import Landmark
 
 from rss_shield.envs.options import LANES, PLANS, Settings
-from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, road_through, tightest
+from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, roads_along, tightest
 from rss_shield.envs.roads.slip import slip_of, steering_of
 from rss_shield.envs.roads.steering import MAX_SLIP
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
@@ -144,6 +144,7 @@ class ShieldedEgo:
         self.judge = self  # or another, which watches by a table of its own
         self.evading = False  # a manoeuvre has begun, and the danger lasts
         self.answers = False  # does a filter that looks once per decision respond in this one?
+        self.cruise: float | None = None  # speed to go back to after braking, where the agent has no say in it [m/s]
         vehicle.act = self.act
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
@@ -185,7 +186,7 @@ class ShieldedEgo:
         steering = float(nominal["steering"])  # single precision where the agent's action is
         self._meet()
         users, ego, bend = self._sense()
-        wish = Command(float(nominal["acceleration"]), float(slip_of(steering)))
+        wish = self._command(self._throttle(nominal), steering)
         danger = find_danger(ego, users, *self.last, self.memory, settings.table)
         self.rooms = danger.room_left, danger.room_right
         response = Response(wish, False, False, False)
@@ -197,7 +198,7 @@ class ShieldedEgo:
         steered = steering
         if command != wish:
             if command.slip != wish.slip:
-                steered = float(steering_of(command.slip))
+                steered = self._steering_for(command)
             vehicle.action = {"steering": steered, "acceleration": command.acceleration}
         elif vehicle.action is not nominal and settings.overrides:
             vehicle.action = dict(nominal)
@@ -216,6 +217,20 @@ class ShieldedEgo:
         if self.record is not None:
             seen = ego, users, bend.curvature, tuple(self.jumped), *before
             self.record.append(Frame(tuple(self.keys), self.poses, command, *seen))
+
+    def _command(self, acceleration: float, steering: float) -> Command:
+        """What the lane frame sees of a command: the slip acts at once."""
+        return Command(acceleration, float(slip_of(steering)))
+
+    def _steering_for(self, command: Command) -> float:
+        """Steering angle that a command takes [rad]."""
+        return float(steering_of(command.slip))
+
+    def _throttle(self, nominal) -> float:
+        """What the agent's own controller asks for [m/s^2]; where it has none, the speed of the environment again."""
+        if self.cruise is None:
+            return float(nominal["acceleration"])
+        return float(ControlledVehicle.KP_A * (self.cruise - self.vehicle.speed))
 
     def _respond(self, wish: Command, danger, ego, users, body: Body) -> Response:
         """What the filter in force makes of a command."""
@@ -442,10 +457,8 @@ class ShieldedEgo:
 
     def _roads_along(self, heading: Heading):
         """The road that the ego is measured along, and the one with the branches that it may still take."""
-        settings, network = self.settings, self.vehicle.road.network
-        reach = reach_of(settings.table.ego, settings.table.other, settings.table.dt)
-        road = road_through(network, heading.lane, reach, heading.way)
-        return road, road_through(network, heading.lane, reach, *heading[1:]) if heading.beside else road
+        table = self.settings.table
+        return roads_along(self.vehicle.road.network, heading, reach_of(table.ego, table.other, table.dt))
 
     def _in_own_lane(self, other) -> bool:
         """Is a car inside a lane that runs its way? Only asked of oncoming cars."""

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import gymnasium as gym
+from highway_env.envs.lane_keeping_env import LaneKeepingEnv
 
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
@@ -11,7 +12,17 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.measured import EgoMeter
 from rss_shield.envs.highway.risk import RiskMeter
 from rss_shield.envs.highway.step import attach, shield_on
-from rss_shield.envs.options import Options, Settings, check_mode, check_risk, settings_for
+from rss_shield.envs.options import (
+    PLANS,
+    Options,
+    Settings,
+    check_mode,
+    check_risk,
+    destination_of,
+    keeps_speed,
+    settings_for,
+)
+from rss_shield.envs.roads.understood import check_roads
 from rss_shield.shield.filters.answer import RSS, Filter
 from rss_shield.shield.lanes.correction import NEAREST
 
@@ -72,6 +83,8 @@ class EgoShields(gym.Wrapper):
         self._check()
         self._settings, self._judge = self._current_settings(), self._judge_settings()
         env: Any = self.env.unwrapped
+        if not isinstance(env, LaneKeepingEnv):  # nobody else is on its lanes, which do not meet
+            check_roads(env.road.network, self._settings.scheme == PLANS)
         for shield in list(egos_on(env)):
             _take_off(shield)
         self._egos = []
@@ -104,10 +117,11 @@ class EgoShields(gym.Wrapper):
         shield = shield_on(vehicle)
         if shield is None or not shield.is_ego:
             among = self.options.traffic == "compliant"
-            shield = attach(
-                vehicle, self._settings, self.options.record, env.config.get("destination"), among, self._judge
-            )
+            shield = attach(vehicle, self._settings, self.options.record, destination_of(env), among, self._judge)
             shield.is_ego = True
+            kinds = getattr(env.action_type, "agents_action_types", [env.action_type])
+            if self._settings.overrides and i < len(kinds) and keeps_speed(env, kinds[i]):
+                shield.cruise = float(vehicle.speed)
             shield.meter = RiskMeter(self.risk) if self.risk is not None else None
             shield.measured = EgoMeter(shield) if self.options.measures else None
             if vehicle.crashed:

@@ -5,12 +5,14 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
+from highway_env.vehicle.dynamics import BicycleVehicle
 
 from rss_shield.envs.decisions.executed import executed_actions
 from rss_shield.envs.highway.compliant import TurnTaker
 from rss_shield.envs.highway.ego import ShieldedEgo, log_of
 from rss_shield.envs.highway.free_ego import FreeEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
+from rss_shield.envs.highway.sliding_ego import SlidingEgo
 from rss_shield.envs.options import LANES, Options, Settings
 from rss_shield.shield.lanes.judge import Audit, audit
 from rss_shield.shield.tally import JUDGED, end_decision, info_at, shield_infos, start_decision
@@ -40,7 +42,7 @@ def attach(
         ego.judge = watching
         return ego
     if settings.scheme == LANES:
-        return ShieldedEgo(vehicle, settings, record)
+        return (SlidingEgo if isinstance(vehicle, BicycleVehicle) else ShieldedEgo)(vehicle, settings, record)
     if not isinstance(vehicle, ControlledVehicle):
         return FreeEgo(vehicle, settings, record, destination)
     return (TurnTaker if takes_turns and settings.overrides else JunctionEgo)(vehicle, settings, record)

@@ -14,7 +14,7 @@ from rss_shield.envs.roads.network import CAR_LENGTH, heading_at, local_coordina
 from rss_shield.envs.roads.slip import slip_of
 from rss_shield.envs.roads.steering import steering_angle
 from rss_shield.shield._numba.compiled import compiled
-from rss_shield.shield.geometry import wrap_angle
+from rss_shield.shield.geometry import follow, nearest_piece, wrap_angle
 
 X, Y, HEADING, SPEED, LATERAL_SPEED, YAW_RATE = range(6)  # of a state, SI units
 
@@ -36,6 +36,9 @@ _STEER = np.pi / 3  # steering angle, at most [rad]
 _PROBE = 0.02  # steering angle from which the effect of steering is measured [rad]
 _NO_EFFECT = 0.05  # yaw rate per steering angle below which it counts as none [1/s]
 _LOOK = 0.5  # the lane's curvature is measured over this distance [m]
+
+# of `steer_along`
+_ENOUGH = 1e-9  # as near to a speed across the lane as is asked for [m/s]
 
 
 @compiled
@@ -140,3 +143,86 @@ def _slopes(heading, v, w, rate, steering):
         front + rear - rate * v,
         (_FRONT * front - _REAR * rear) / _INERTIA,
     )
+
+
+# ---------------------------------------------------------------- a bicycle whose tyres slip, along a road
+
+
+def longest_frame() -> float:
+    """Above this, the integration step grows a yaw rate at some speed from `_CREEP` on, whatever the driver does [s].
+
+    Runge and Kutta's step of fourth order keeps z' = -c z stable while c dt < 2.785.
+    """
+    fastest = (_FRONT**2 * _STIFFNESS_FRONT + _REAR**2 * _STIFFNESS_REAR) / _INERTIA / _CREEP
+    return 2.785 / fastest
+
+
+@compiled
+def across(road, state):
+    """Speed across a road now [m/s], and the angle to it [rad].
+
+    Args:
+      road: `[K, 11]` pieces.
+      state: `[6]`, as in `lane_keeping`.
+    """
+    _, _, _, tangent = nearest_piece(road, state[X], state[Y])
+    psi = wrap_angle(state[HEADING] - tangent)
+    return state[SPEED] * np.sin(psi) + state[LATERAL_SPEED] * np.cos(psi), psi
+
+
+@compiled
+def frame_across(road, state, acceleration, steering, dt):
+    """What one frame does: (speed across the road meanwhile, and after it [m/s]; angle to the road after it [rad])."""
+    before = state[X], state[Y], state[HEADING], state[SPEED], state[LATERAL_SPEED], state[YAW_RATE]
+    _, lateral, k, _ = nearest_piece(road, state[X], state[Y])
+    _slide(state, acceleration, steering, dt)
+    lateral_next, tangent = follow(road, k, state[X], state[Y])
+    psi = wrap_angle(state[HEADING] - tangent)
+    after = state[SPEED] * np.sin(psi) + state[LATERAL_SPEED] * np.cos(psi)
+    _put(state, before)
+    return (lateral_next - lateral) / dt, after, psi
+
+
+@compiled
+def steer_along(road, state, acceleration, wish, limits, heading_bound, dt):
+    """Steering angle nearest to a wish that keeps the speed across a road inside its limits [rad].
+
+    The tyres' lateral force is the acceleration across the road: 30 m/s^2 per steering angle, less 60 times the angle
+    of the slip. So the angle is chosen by the speed across the road that it leads to after a frame; heading and yaw
+    rate swing meanwhile, and settle by themselves where frames are short enough (`longest_frame`). Below 1 m/s steering
+    has no effect, and lateral speed and yaw rate die down.
+
+    Args:
+      road: `[K, 11]` pieces.
+      state: `[6]`, as in `lane_keeping`.
+      acceleration: of the same command [m/s^2].
+      wish: what the agent asks for [rad].
+      limits: to the left and to the right during this frame, and after it [m/s], none negative.
+      heading_bound: sine of the largest angle to the road.
+      dt: length of a frame [s].
+    """
+    left, right, left_next, right_next = limits
+    during, after, psi = frame_across(road, state, acceleration, wish, dt)
+    now, psi_now = across(road, state)
+    turned = abs(np.sin(psi)) > max(heading_bound, abs(np.sin(psi_now)))
+    if -left <= during <= right and -left_next <= after <= right_next and not turned:
+        return wish
+    if abs(state[SPEED]) < _CREEP:
+        return wish
+    target = min(max(0.0 if turned else after, -left_next), right_next)
+    target = min(max(target, -2.0 * left - now), 2.0 * right - now)  # about half of a change comes in the frame itself
+    target = min(max(target, -left_next), right_next)
+    return _steering_to(road, state, acceleration, target, dt)
+
+
+@compiled
+def _steering_to(road, state, acceleration, target, dt):
+    """Steering angle after which a frame ends at a speed across the road [m/s]."""
+    a, b = 0.0, _PROBE
+    _, at_a, _ = frame_across(road, state, acceleration, a, dt)
+    for _ in range(4):
+        _, at_b, _ = frame_across(road, state, acceleration, b, dt)
+        if abs(at_b - target) < _ENOUGH or at_b == at_a:
+            break
+        a, b, at_a = b, min(max(b + (target - at_b) * (b - a) / (at_b - at_a), -_STEER), _STEER), at_b
+    return b

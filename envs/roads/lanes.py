@@ -17,13 +17,18 @@ from rss_shield.envs.roads.traced_lane import TracedLane
 from rss_shield.shield.definitions.longitudinal import d_min_longitudinal
 from rss_shield.shield.geometry import (
     AFTER,
+    ARC_START,
     AROUND,
     BEFORE,
+    COS,
     CURVATURE,
     CUT,
     FREE,
     HEADING,
     LENGTH,
+    SIN,
+    X,
+    Y,
     make_road,
     wrap_angle,
 )
@@ -35,9 +40,20 @@ Way = tuple[tuple[str, str], ...]  # roads one after the other: node where each 
 
 _JOIN = 0.5  # lane ends closer than this belong together [m]
 _TURN = np.pi / 4  # ... if the angle between them is smaller than this [rad]
+_OVERLAP = 5.0  # where none does, lanes in line may overlap, or leave a gap, of less than this [m]
+_EXACT = 1e-3  # joints that are better than this are as they should be [m]
 _SAMPLE = 2.0  # spacing of the pieces that stand in for a curve of changing curvature [m]
 _ALIGNED = 1e-9  # straight pieces with headings as close as this are one line [rad]
 _LONGEST = 20.0  # of two road users, added up [m]
+
+
+class _Link(NamedTuple):
+    """What comes after a lane, or before it."""
+
+    lane: LaneIndex
+    shift: float  # of the road from the middle of that lane, positive to the right [m]
+    overlap: float  # of the two lanes, along the earlier one; negative where there is a gap [m]
+    way: Way  # after it
 
 
 class _Stretch(NamedTuple):
@@ -48,7 +64,7 @@ class _Stretch(NamedTuple):
     nearer: LaneIndex | None  # lane between it and the origin
     start: float  # arc length of its start, from the start of the origin [m]
     pieces: list[tuple[float, ...]]
-    links: list[tuple[LaneIndex, float, Way]]  # what comes next: lane, shift, and the way after it
+    links: list[_Link]  # what comes next
 
 
 # ---------------------------------------------------------------- roads
@@ -100,7 +116,7 @@ def _next(stretch: _Stretch, row: dict[LaneIndex, int]) -> int:
     """Row of what comes next after a stretch."""
     if not stretch.links:
         return FREE
-    return next((row[lane] for lane, *_ in stretch.links if lane in row), CUT)
+    return next((row[link.lane] for link in stretch.links if link.lane in row), CUT)
 
 
 def _explore(
@@ -108,25 +124,41 @@ def _explore(
 ) -> tuple[dict[LaneIndex, _Stretch], float]:
     """Lanes that come after (or before) a lane, nearest first, each by the shortest way; and the shortest way round."""
     found: dict[LaneIndex, _Stretch] = {}
-    waiting: list[tuple[float, int, Any]] = [(0.0, 0, (index, 0.0, None, way))]
+    waiting: list[tuple[float, int, Any]] = [(0.0, 0, (index, 0.0, None, way, 0.0))]
     count, around, middle = 0, np.inf, 0.0
     while waiting:
-        distance, _, (lane, shift, nearer, rest) = heappop(waiting)
+        distance, _, (lane, shift, nearer, rest, overlap) = heappop(waiting)
         if lane in found:
             if lane == index:
                 around = min(around, distance)
             continue
-        pieces = _pieces_of(network.get_lane(lane), shift)
+        links = _links(network, lane, shift, forward, rest)
+        if forward and links:
+            overlap = max(min(link.overlap for link in links), 0.0)
+        pieces = _shortened(_pieces_of(network.get_lane(lane), shift), overlap)
         length = sum(piece[LENGTH] for piece in pieces)
         middle = middle or length  # the length of the lane that all started from
-        links = _links(network, lane, shift, forward, rest)
         start = distance if forward else middle - distance - length
         found[lane] = _Stretch(lane, shift, nearer, start, pieces, links)
         if distance + length - middle < reach:
-            for following, moved, later in links:
+            for link in links:
                 count += 1
-                heappush(waiting, (distance + length, count, (following, moved, lane, later)))
+                lost = max(link.overlap, 0.0)  # of the one before, which ends where this one begins
+                gap = overlap - link.overlap if forward else lost - link.overlap
+                following = link.lane, link.shift, lane, link.way, lost
+                heappush(waiting, (distance + length + gap, count, following))
     return _without_ends(found), around
+
+
+def _shortened(pieces: list[tuple[float, ...]], overlap: float) -> list[tuple[float, ...]]:
+    """Pieces without the end of the last ones, so long as one is left."""
+    while overlap > 0.0:
+        *rest, (x, y, heading, curvature, length) = pieces
+        if length <= overlap and rest:
+            pieces, overlap = rest, overlap - length
+            continue
+        pieces, overlap = [*rest, (x, y, heading, curvature, max(length - overlap, _EXACT))], 0.0
+    return pieces
 
 
 def _without_ends(found: dict[LaneIndex, _Stretch]) -> dict[LaneIndex, _Stretch]:
@@ -143,16 +175,17 @@ def _without_ends(found: dict[LaneIndex, _Stretch]) -> dict[LaneIndex, _Stretch]
     return found
 
 
-def _links(network: Any, index: LaneIndex, shift: float, forward: bool, way: Way) -> list[tuple[LaneIndex, float, Way]]:
-    """Lanes that continue a lane (or lead to it), with the shift of the road on them and the way after them.
+def _links(network: Any, index: LaneIndex, shift: float, forward: bool, way: Way) -> list[_Link]:
+    """Lanes that continue a lane (or lead to it).
 
-    Those that continue it without a jump, on the planned road if there are any; or else the nearest: the lane
-    ends, and the road goes on beside it.
+    Those that continue it without a jump, on the planned road if there are any; or else those in line with it that
+    overlap it, or begin after a gap, as on highway-env's racetracks; or else the nearest: the lane ends, and the road
+    goes on beside it. Where lanes do not meet exactly the road goes on without a jump beside the middle of the next.
     """
     lane = network.get_lane(index)
     s = lane.length if forward else 0.0
     end, heading = lane.position(s, shift), lane.heading_at(s)
-    joined, aside = [], []
+    joined, in_line, aside = [], [], []
     for road in _roads_at(network, index, forward):
         planned = bool(way) and way[0] == road
         for i, other in enumerate(network.graph[road[0]][road[1]]):
@@ -160,20 +193,51 @@ def _links(network: Any, index: LaneIndex, shift: float, forward: bool, way: Way
             if abs(wrap_angle(heading - other.heading_at(at))) >= _TURN:
                 continue
             gap, normal = end - other.position(at, 0.0), other.position(at, 1.0) - other.position(at, 0.0)
-            across, link, rest = float(gap @ normal), (*road, i), way[1:] if planned else ()
+            across, along = float(gap @ normal), float(gap[0] * normal[1] - gap[1] * normal[0])
+            link, rest = (*road, i), way[1:] if planned else ()
             if np.hypot(*gap) < _JOIN:
-                joined.append((planned, (link, 0.0, rest)))
+                joined.append((planned, _Link(link, *_meeting(lane, other, shift, forward), rest)))
+            elif abs(across) < _JOIN and abs(along) < _OVERLAP:
+                in_line.append((planned, _Link(link, *_meeting(lane, other, shift, forward), rest)))
             elif np.hypot(*(gap - across * normal)) < _JOIN:
-                aside.append((not planned, abs(across), (link, across, rest)))
+                aside.append((not planned, abs(across), _Link(link, across, 0.0, rest)))
+    joined = joined or in_line
     if joined or not aside:
         chosen = any(planned for planned, _ in joined)
         return [link for planned, link in joined if planned or not chosen]
     return [min(aside, key=lambda one: one[:2])[2]]
 
 
+def _meeting(lane: Any, other: Any, shift: float, forward: bool) -> tuple[float, float]:
+    """Where two lanes in line meet: shift of the road on the other one, and by how much they overlap [m].
+
+    Where they overlap the earlier one ends where the later one begins.
+    """
+    earlier, later = (lane, other) if forward else (other, lane)
+    moved = (shift, 0.0) if forward else (0.0, shift)  # the road, from the middle of either
+    start = later.position(0.0, moved[1])
+    tangent = later.position(_EXACT, moved[1]) - start
+    tangent, overlap = tangent / np.hypot(*tangent), 0.0
+    for _ in range(3):  # a curved lane is longer than its way along the tangent
+        along = float((earlier.position(earlier.length - overlap, moved[0]) - start) @ tangent)
+        overlap += along
+        if overlap < 0.0:
+            break
+    if abs(overlap) <= _EXACT:
+        overlap = 0.0
+    s = earlier.length - max(overlap, 0.0)
+    if forward:
+        across = (earlier.position(s, shift) - later.position(0.0, 0.0)) @ (
+            later.position(0.0, 1.0) - later.position(0.0, 0.0)
+        )
+    else:
+        across = (start - earlier.position(s, 0.0)) @ (earlier.position(s, 1.0) - earlier.position(s, 0.0))
+    return float(across) if abs(across) > _EXACT else 0.0, overlap
+
+
 def successors(network: Any, index: LaneIndex) -> list[LaneIndex]:
     """Lanes that go on where a lane ends; where it just ends, the nearest one beside it."""
-    return [link for link, _, _ in _links(network, index, 0.0, True, ())]
+    return [link.lane for link in _links(network, index, 0.0, True, ())]
 
 
 def _roads_at(network: Any, index: LaneIndex, forward: bool) -> list[tuple[str, str]]:
@@ -204,6 +268,22 @@ def _pieces_of(lane: Any, shift: float = 0.0) -> list[tuple[float, ...]]:
     ]
 
 
+def turned_round(road: np.ndarray) -> np.ndarray:
+    """The same road for who drives it the other way: `[K, 11]` pieces, with arc lengths that grow in that direction."""
+    turned = road.copy()
+    heading, kappa, length = road[:, HEADING], road[:, CURVATURE], road[:, LENGTH]
+    half = 0.5 * kappa * length
+    chord = length * np.sinc(half / np.pi)
+    turned[:, X] += chord * np.cos(heading + half)
+    turned[:, Y] += chord * np.sin(heading + half)
+    turned[:, HEADING] = (heading + 2.0 * half) % (2.0 * np.pi) - np.pi
+    turned[:, CURVATURE] = -kappa
+    turned[:, ARC_START] = -(road[:, ARC_START] + length)
+    turned[:, COS], turned[:, SIN] = np.cos(turned[:, HEADING]), np.sin(turned[:, HEADING])
+    turned[:, BEFORE], turned[:, AFTER] = road[:, AFTER], road[:, BEFORE]
+    return turned
+
+
 def tightest(network: Any) -> float:
     """Largest curvature of any arc of a network [1/m]."""
     lanes = network.lanes_list()
@@ -228,6 +308,7 @@ class Heading(NamedTuple):
     lane: LaneIndex
     way: Way = ()  # planned roads after it
     beside: tuple[LaneIndex, ...] = ()  # lanes that it may still take instead
+    against: bool = False  # it drives that lane in the wrong direction (hole H25)
 
 
 def heading_of(vehicle: Any) -> Heading:
@@ -238,8 +319,30 @@ def heading_of(vehicle: Any) -> Heading:
     """
     network, index = vehicle.road.network, vehicle.lane_index
     if not isinstance(vehicle, ControlledVehicle):
-        return heading_anywhere(network, index, vehicle.position, vehicle.WIDTH)
-    return heading_toward(network, index, vehicle.target_lane_index, vehicle.route or [])
+        heading = heading_anywhere(network, index, vehicle.position, vehicle.WIDTH)
+    else:
+        heading = heading_toward(network, index, vehicle.target_lane_index, vehicle.route or [])
+    return heading._replace(against=is_against(network, heading.lane, vehicle.position, vehicle.heading))
+
+
+def is_against(network: Any, index: LaneIndex, position: Any, heading: float) -> bool:
+    """Does a car drive a lane in the wrong direction? Then there is none of its own direction that is nearer."""
+    lane = network.get_lane(index)
+    return bool(np.cos(heading - lane.heading_at(lane.local_coordinates(position)[0])) < 0.0)
+
+
+def roads_along(network: Any, heading: Heading, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """The road that a car is measured along, and the one with the branches that it may still take.
+
+    Who drives a lane in the wrong direction is measured along the same road turned round: then those who come along it
+    drive towards it, in a lane of their own.
+    """
+    road = road_through(network, heading.lane, reach, heading.way)
+    branches = road_through(network, heading.lane, reach, heading.way, heading.beside) if heading.beside else road
+    if not heading.against:
+        return road, branches
+    turned = turned_round(road)
+    return turned, turned if branches is road else turned_round(branches)
 
 
 def heading_anywhere(network: Any, index: LaneIndex, position: Any, width: float) -> Heading:

@@ -69,12 +69,12 @@ def walks(network) -> list[list[tuple]]:
     takes a lane twice. What is the end of a longer way is left out.
     """
     indices = list(network.lanes_dict())
-    entered = {following for index in indices for following in _successors(network, index)}
+    entered = {following for index in indices for following in successors(network, index)}
     starts = [index for index in indices if index not in entered]
     starts += [index for index in indices if index in entered and _is_on_ring(network, index)]
     found: list[list[tuple]] = []
     for start in starts:
-        found += [walk for walk in _walks_from(network, [start]) if not _successors(network, walk[-1])]
+        found += [walk for walk in _walks_from(network, [start]) if not successors(network, walk[-1])]
     longest_first = sorted(found, key=len, reverse=True)
     kept: list[list[tuple]] = []
     for walk in longest_first:
@@ -83,7 +83,7 @@ def walks(network) -> list[list[tuple]]:
     return sorted(kept)
 
 
-def _successors(network, index) -> list[tuple]:
+def successors(network, index) -> list[tuple]:
     """Lanes that go on where a lane ends. Roads that only share a node, to turn back there, do not."""
     origin, end, i = index
     lane = network.get_lane(index)
@@ -107,15 +107,15 @@ def _is_on_ring(network, index) -> bool:
     reached: set[tuple] = set()
     ahead = [index]
     while ahead:
-        following = [lane for lane in _successors(network, ahead.pop()) if lane not in reached]
+        following = [lane for lane in successors(network, ahead.pop()) if lane not in reached]
         reached.update(following)
         ahead += following
     return index in reached
 
 
 def _walks_from(network, walk) -> Iterator[list[tuple]]:
-    following = [index for index in _successors(network, walk[-1]) if index not in walk]
-    if not _successors(network, walk[-1]) or not following:
+    following = [index for index in successors(network, walk[-1]) if index not in walk]
+    if not successors(network, walk[-1]) or not following:
         yield walk
     for index in following:
         yield from _walks_from(network, [*walk, index])
@@ -341,7 +341,7 @@ def _crossed(lane, offset, conflicts) -> np.ndarray:
 def successors_of(network) -> np.ndarray:
     """Each lane and those that go on where it ends, as sets of bits `[L]`."""
     number = {index: i for i, index in enumerate(network.lanes_dict())}
-    lanes = [(index, *_successors(network, index)) for index in number]
+    lanes = [(index, *successors(network, index)) for index in number]
     return np.array([sum(1 << number[index] for index in {*group}) for group in lanes], np.int64)
 
 
@@ -357,7 +357,7 @@ def lead_of(network) -> np.ndarray:
     lead = dict.fromkeys(indices, 0.0)
     for index in indices:
         lane = network.get_lane(index)
-        for following in _successors(network, index):
+        for following in successors(network, index):
             s, _ = network.get_lane(following).local_coordinates(lane.position(lane.length - CAR_LENGTH / 2, 0.0))
             lead[following] = max(lead[following], float(-s))
     return np.array(list(lead.values()))

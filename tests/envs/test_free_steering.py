@@ -137,7 +137,11 @@ def test_the_route_leads_from_the_lane_of_the_ego_to_the_destination():
             {"destination": "o9"},
             r"destination = 'o9': expected a node that a car from 'o0'",
         ),
-        ("signalised-intersection-v0", KINEMATIC[1], r"ContinuousAction is not supported on Signalised"),
+        (
+            "highway-v0",
+            {"action": {"type": "ContinuousAction", "dynamical": True}},
+            r"dynamical = True with config simulation_frequency = 15: expected >= 56 along lanes",
+        ),
         (
             "highway-fast-v0",
             {"action": {"type": "ContinuousAction", "speed_range": [5, 30]}},

@@ -12,8 +12,9 @@ from rss_shield.envs.roads.lanes import (
     LaneIndex,
     heading_anywhere,
     heading_toward,
+    is_against,
     reach_of,
-    road_through,
+    roads_along,
     tightest,
 )
 from rss_shield.envs.roads.traced_lane import TracedLane
@@ -67,23 +68,24 @@ class World:
 
     def heading(self, t: int, i: int) -> Heading:
         """Which lane a user drives on and which way it takes from there, as far as the log says."""
-        index = self.indices[self.on[t, i]]
+        u, index = self.trace.users, self.indices[self.on[t, i]]
+        position = np.array([u.x[t, i], u.y[t, i]])
+        heading = Heading(index)
         announced = [one for one in self.routes.get(i, []) if one[0] <= t]
-        if not announced:
-            return Heading(index)
-        _, target, route = announced[-1]
-        if target is None:
-            u = self.trace.users
-            return heading_anywhere(self.network, index, np.array([u.x[t, i], u.y[t, i]]), float(u.width[i]))
-        return heading_toward(self.network, index, target, route)
+        if announced:
+            _, target, route = announced[-1]
+            if target is None:
+                heading = heading_anywhere(self.network, index, position, float(u.width[i]))
+            else:
+                heading = heading_toward(self.network, index, target, route)
+        against = is_against(self.network, heading.lane, position, u.heading[t, i])
+        return heading._replace(against=against)
 
     def roads(self, heading: Heading, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """The road along a heading, and the one with the branches that may still be taken; see `ShieldedEgo`."""
         key = (heading, reach)
         if key not in self._roads:
-            road = road_through(self.network, heading.lane, reach, heading.way)
-            branches = road_through(self.network, heading.lane, reach, *heading[1:]) if heading.beside else road
-            self._roads[key] = road, branches
+            self._roads[key] = roads_along(self.network, heading, reach)
         return self._roads[key]
 
     def is_in_own_lane(self, t: int, j: int) -> bool:
