@@ -16,7 +16,9 @@ from highway_env.envs.u_turn_env import UTurnEnv
 
 from rss_shield.envs.arguments import number, preset_of, rules_of
 from rss_shield.envs.stock import LOWEST_FREQUENCY, check_frequencies
+from rss_shield.envs.worlds.occluded import OccludedIntersectionEnv
 from rss_shield.envs.worlds.signalised import SignalisedIntersectionEnv
+from rss_shield.envs.worlds.streets import StreetEnv
 from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
 from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
@@ -35,14 +37,17 @@ PENALTIES = ("response", "change")  # what an intervention penalty is charged fo
 REPLACES = ("frame", "decision")  # what an action that is not permitted is replaced on
 SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, roundabout-v0/-v1, "
-    "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0"
+    "roundabout-generic-v0, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, signalised-intersection-v0, "
+    "crosswalk-v0, parked-row-v0, occluded-intersection-v0"
 )
 Params = str | Preset | Sequence[RSSParams] | Mapping[str, Any] | None  # see `ShieldWrapper`
 _SCHEMES = {
     **dict.fromkeys((HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv, UTurnEnv), LANES),
     RoundaboutEnv: PLANS,
     IntersectionEnv: PLANS,
+    StreetEnv: PLANS,
 }
+_ROUTES_ONLY = (SignalisedIntersectionEnv, OccludedIntersectionEnv)
 
 
 class Settings(NamedTuple):
@@ -238,7 +243,7 @@ def _check_free_driving(action_type: ContinuousAction, env: Any) -> None:
         if action_type.dynamical:
             raise ValueError("action option dynamical = True is supported at intersections only; expected False")
         return
-    if not isinstance(env, IntersectionEnv) or isinstance(env, SignalisedIntersectionEnv):
+    if not isinstance(env, IntersectionEnv) or isinstance(env, _ROUTES_ONLY):
         raise ValueError(
             f"action type {type(action_type).__name__} is not supported on {type(env).__name__}, because a car that is "
             "steered freely may leave its route there; expected DiscreteMetaAction"
