@@ -128,9 +128,10 @@ def play_all(config: Config) -> None:
 
 
 def rows() -> list[dict[str, Any]]:
-    """All episodes that have been played; a line that a kill has cut off is not one."""
+    """All episodes that have been played, each once; a line that a kill has cut off is not one."""
     lines = RAW.read_text(encoding="utf-8").splitlines() if RAW.exists() else []
-    return [json.loads(line) for line in lines if line.endswith("}")]
+    found = [json.loads(line) for line in lines if line.endswith("}")]
+    return list({(row["env"], row["policy"], row["arm"], row["seed"]): row for row in found}.values())
 
 
 # ---------------------------------------------------------------- the page

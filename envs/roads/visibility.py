@@ -62,7 +62,8 @@ def corners_of(box: Box) -> np.ndarray:
 
 def box_of(user) -> Box:
     """The box of one of highway-env's vehicles or objects."""
-    return Box(*map(float, user.position), user.LENGTH, user.WIDTH, float(user.heading))
+    x, y = user.position
+    return Box(float(x), float(y), user.LENGTH, user.WIDTH, float(user.heading))
 
 
 def eye_of(vehicle) -> np.ndarray:

@@ -69,14 +69,14 @@ class ParkedRowEnv(StreetEnv):
         gaps = self._gaps()
         many = min(self.config["pedestrians"], len(gaps))
         chosen = rng.choice(len(gaps), size=min(many + 1, len(gaps)), replace=False)
-        people = [self._child(*gaps[k], True) for k in chosen[:many]]
+        people = [self._child(gaps[k], True) for k in chosen[:many]]
         if len(chosen) > many and rng.random() < self.config["unreasonable"]:
-            people.append(self._child(*gaps[chosen[-1]], False))
+            people.append(self._child(gaps[chosen[-1]], False))
         return people
 
-    def _child(self, start: float, end: float, reasonable: bool) -> Person:
+    def _child(self, gap: tuple[float, float], reasonable: bool) -> Person:
         rng = self.np_random
-        x, near = float(rng.uniform(start, end)), float(rng.uniform(2.0, 30.0))
+        x, near = float(rng.uniform(*gap)), float(rng.uniform(2.0, 30.0))
         v = float(rng.uniform(1.0, REASONABLE[PLACE].v_high)) if reasonable else float(rng.uniform(*_FAST))
         errand = Errand(RUNS_OUT if reasonable else DASHES, v, 0.0, near, -KERB)
         return Person(x, ROW + _BACK, errand, PLACE)
@@ -90,7 +90,8 @@ class OccludedIntersectionEnv(IntersectionEnv):
     """highway-env's intersection with buildings at its corners.
 
     The configuration is that of `IntersectionEnv`, and `occluders` (False = no buildings), `ghosts` (False = the shield
-    is not shown who may be hidden, for comparison); `duration` is 30 s, because who sees little has to wait longer.
+    is not shown who may be hidden, for comparison); `duration` is 30 s, because who sees little has to wait longer, and
+    fewer cars come.
 
     Raises:
       ValueError: a bad configuration; the message names field, value and range.
@@ -101,7 +102,13 @@ class OccludedIntersectionEnv(IntersectionEnv):
 
     @classmethod
     def default_config(cls) -> dict:
-        return super().default_config() | {"occluders": True, "ghosts": True, "duration": 30}
+        return super().default_config() | {
+            "occluders": True,
+            "ghosts": True,
+            "duration": 30,
+            "initial_vehicle_count": 6,
+            "spawn_probability": 0.3,
+        }
 
     def _make_road(self) -> None:
         for name in ("occluders", "ghosts"):

@@ -25,7 +25,8 @@ OWN, ONCOMING = LANE / 2, -LANE / 2  # middles of the lanes [m]
 LIMIT = 10.0  # [m/s]
 KERB = LANE + 1.2  # where people wait, from the middle of the street: too far away for IDM to stop [m]
 STRIPE = 0.5  # of a crossing, and the gap to the next one [m]
-WHITE, GREY = (240, 240, 240), (70, 70, 80)
+MARK = 0.6  # half of a square that shows where somebody is [m]
+WHITE, GREY, ORANGE = (240, 240, 240), (70, 70, 80), (250, 140, 0)
 
 
 class Person(NamedTuple):
@@ -38,7 +39,7 @@ class Person(NamedTuple):
 
 
 class StreetSurface(WorldSurface):
-    """Where highway-env draws; stripes and buildings come before lanes and cars."""
+    """Where highway-env draws; stripes, buildings and marks below pedestrians come before lanes and cars."""
 
     def __init__(self, env, plain: WorldSurface) -> None:
         super().__init__(plain.get_size(), 0, plain)
@@ -55,6 +56,9 @@ class StreetSurface(WorldSurface):
             for box in surroundings.boxes:
                 half = box.length / 2, box.width / 2
                 self._paint(GREY, box.x - half[0], box.y - half[1], box.x + half[0], box.y + half[1])
+            for walker in self.env.road.walkers:
+                x, y = walker.position
+                self._paint(ORANGE, x - MARK, y - MARK, x + MARK, y + MARK)
         return area
 
     def _paint(self, colour, left: float, top: float, right: float, bottom: float) -> None:
@@ -117,7 +121,7 @@ class StreetEnv(AbstractEnv):
                 "reward_speed_range": [4.0, 9.0],
                 "screen_width": 900,
                 "screen_height": 200,
-                "scaling": 6.0,
+                "scaling": 7.0,
             }
         )
         return config

@@ -30,6 +30,7 @@ _DRIVER = (1.0, 3.0, 4.0)  # response time [s], acceleration and braking [m/s^2]
 _HARDEST = 3.0  # acceleration of cars that children expect [m/s^2]
 _KEPT_CLEAR = 1.0  # between somebody who waits and where cars drive [m]
 _APART = 0.13  # half the way from one place looked at to the next [m]
+_STANDS = 0.1  # slower is standing [m/s]
 _LEAP = 6.0  # acceleration of who is unreasonable [m/s^2]
 
 
@@ -54,6 +55,8 @@ class Walker(RoadObject):
     """A pedestrian. It walks straight across the road, along y."""
 
     LENGTH = WIDTH = 0.5
+    position: np.ndarray  # [m]
+    speed: float  # [m/s]
 
     def __init__(self, road, position, heading: float = 0.0, speed: float = 0.0) -> None:
         super().__init__(road, position, heading, speed)
@@ -135,16 +138,24 @@ class Walker(RoadObject):
     def _has_passed(self, car) -> bool:
         return self._ahead_of(car) < -car.LENGTH - 1.0
 
+    def _waits_for_it(self, car) -> bool:
+        """Does a car stand before it?"""
+        return bool(car.speed < _STANDS and self._ahead_of(car) > RADIUS)
+
     def _can_stop(self, car) -> bool:
         """Can a driver stop before it, or has passed?"""
         rho, a, b = _DRIVER
         ahead = self._ahead_of(car)
-        return self._has_passed(car) or ahead > reach(max(car.speed, 0.0), rho, a, b, np.inf) + 3.0
+        return (
+            self._has_passed(car)
+            or self._waits_for_it(car)
+            or ahead > reach(max(car.speed, 0.0), rho, a, b, np.inf) + 3.0
+        )
 
     def _comes_first(self, car) -> bool:
         """Is it before the front of a car however the driver accelerates, or has that passed by then?"""
         t = self._time_to(self._to_lane(car))
-        if self._has_passed(car):
+        if self._has_passed(car) or self._waits_for_it(car):
             return True
         return self._ahead_of(car) > max(car.speed, 0.0) * t + 0.5 * _HARDEST * t**2 + _COMES_FIRST
 
@@ -300,7 +311,7 @@ class Watched:
 def _lets_pass(user, vehicle) -> bool:
     """Does a pedestrian stand beside where a car drives along x?"""
     beside = abs(user.position[1] - vehicle.position[1]) - vehicle.WIDTH / 2
-    return isinstance(user, Walker) and user.speed < 0.1 and beside > RADIUS + 0.2
+    return isinstance(user, Walker) and user.speed < _STANDS and beside > RADIUS + 0.2
 
 
 class WatchedRoad(Watched, Road):
