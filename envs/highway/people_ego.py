@@ -12,7 +12,8 @@ from rss_shield.envs.roads.ways import CAR_ON_ROAD
 from rss_shield.envs.worlds.walkers import RADIUS, ParkedCar, Walker, along_way
 from rss_shield.shield.definitions.occlusion import REASONABLE
 from rss_shield.shield.junctions.controller import CROSSING, JunctionReport
-from rss_shield.shield.junctions.plans import THREAT, Scene
+from rss_shield.shield.junctions.plans import Scene
+from rss_shield.shield.junctions.reach import THREAT
 from rss_shield.shield.people.judge import WATCHED, Seen, judge_exposure, watch_person
 from rss_shield.shield.people.reach import PERSON, has_way, list_people, place_on_path
 from rss_shield.shield.verdicts import INHERITED, KEPT, OTHER, Verdict
