@@ -4,7 +4,9 @@ from typing import Any
 
 import gymnasium as gym
 
-import rss_shield.envs.worlds.signalised  # noqa: F401  registers another one
+import rss_shield.envs.worlds.crosswalk
+import rss_shield.envs.worlds.occluded
+import rss_shield.envs.worlds.signalised  # noqa: F401  these register others
 from rss_shield.envs.highway.multi_agent import MultiAgentShield, has_agents
 from rss_shield.envs.highway.wrapper import ShieldWrapper
 from rss_shield.envs.options import MODES, Options, Params, split

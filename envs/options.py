@@ -19,6 +19,8 @@ from highway_env.envs.u_turn_env import UTurnEnv
 from rss_shield.envs.arguments import number, preset_of, rules_of
 from rss_shield.envs.roads.bicycle import longest_frame
 from rss_shield.envs.stock import LOWEST_FREQUENCY, check_frequencies
+from rss_shield.envs.worlds.occluded import OccludedIntersectionEnv
+from rss_shield.envs.worlds.streets import StreetEnv
 from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
 from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
@@ -39,14 +41,16 @@ SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, merge-generic-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, "
     "racetrack-v0/-v1, racetrack-large-v0/-v1, racetrack-oval-v0/-v1, lane-keeping-v0, roundabout-v0/-v1, "
     "roundabout-generic-v0/-v1, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, "
-    "signalised-intersection-v0"
+    "signalised-intersection-v0, crosswalk-v0, parked-row-v0, occluded-intersection-v0"
 )
 Params = str | Preset | Sequence[RSSParams] | Mapping[str, Any] | None  # see `ShieldWrapper`
 _SCHEMES = {
     **dict.fromkeys((HighwayEnv, TwoWayEnv, MergeEnv, ExitEnv, UTurnEnv, RacetrackEnv, LaneKeepingEnv), LANES),
     RoundaboutEnv: PLANS,
     IntersectionEnv: PLANS,
+    StreetEnv: PLANS,
 }
+_META_ONLY = (OccludedIntersectionEnv, StreetEnv)  # where people walk, a car has to keep to its route
 
 
 class Settings(NamedTuple):
@@ -251,6 +255,11 @@ def _check_free_driving(action_type: ContinuousAction, env: Any) -> None:
                 f"{lowest:.0f} along lanes, because longer frames make a slow car whose tyres slip swing about"
             )
         return
+    if isinstance(env, _META_ONLY):
+        raise ValueError(
+            f"action type {type(action_type).__name__} is not supported on {type(env).__name__}, because a car that is "
+            "steered freely may leave its route there; expected DiscreteMetaAction"
+        )
     if not destination_of(env):
         raise ValueError(
             f"config destination = {env.config['destination']!r}: expected a node such as 'o1', because a car that is "

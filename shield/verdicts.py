@@ -11,6 +11,8 @@ from rss_shield.shield._numba.compiled import compiled, inner
 KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
 # at junctions; who is TRAPPED has no plan left toward anybody because a third broke its duty
 LEFT_NO_PLAN, WAVERED, ACCELERATED, BRAKED, LEFT_PATHS, CRASHED, GAVE_NO_WAY, REVERSED, CUT_IN, TRAPPED = range(7, 17)
+# of and toward pedestrians, and whoever was hidden
+LEAPED, WALKED_IN, HURRIED, LEFT_CROSSING, UNREASONABLE, NO_CAUTION = range(17, 23)
 DUTIES = (
     "",
     "got farther along the lane than its share [m]",
@@ -29,6 +31,12 @@ DUTIES = (
     "reversed [m/s]",
     "cut in in front of the other",
     "none: somebody else had trapped the ego",
+    "got farther than a pedestrian may reach [m]",
+    "walked into a car that was there before",
+    "went faster than a pedestrian may [m/s]",
+    "left the crossing",
+    "came out of hiding faster than is reasonable [m/s]",
+    "drove too fast for who was hidden",
 )
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")

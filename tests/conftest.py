@@ -30,6 +30,7 @@ SLOW = frozenset(
         "envs/test_measured",
         "envs/test_multi_agent",
         "envs/test_parallel_env",
+        "envs/test_people",
         "envs/test_random_roads",
         "envs/test_recorder",
         "envs/test_roads",

@@ -41,7 +41,8 @@ OWES = {
     "shield.anything",
     "shield.comfort",
 }
-BELOW = LAWS | OWES | {"shield.lanes", "shield.junctions", "shield.filters", "shield.tally", "shield.trace"}
+KEEPERS = {"shield.lanes", "shield.junctions", "shield.people", "shield.filters"}
+BELOW = LAWS | OWES | KEEPERS | {"shield.tally", "shield.trace"}
 ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
 ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
 MAY_IMPORT = {
@@ -52,6 +53,7 @@ MAY_IMPORT = {
     "shield.risk": LAWS | OWES,
     "shield.lanes": LAWS | OWES,
     "shield.junctions": LAWS | OWES | {"shield.lanes"},  # a verdict is one on either kind of road
+    "shield.people": LAWS | OWES | {"shield.junctions"},  # pedestrians are threats to the same plans
     "shield.filters": LAWS | OWES | {"shield.lanes"},
     "envs._numpy": {"envs.compiled", "shield._numba"},
     "envs.compiled": {"envs._numpy", "shield._numba"},

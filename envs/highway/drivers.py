@@ -13,6 +13,7 @@ from rss_shield.envs.highway.compliant import CompliantDriver, take_turns
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.step import attach, shield_on
 from rss_shield.envs.options import LANES, Settings
+from rss_shield.envs.worlds.walkers import Watched
 from rss_shield.shield.junctions.controller import PRIORITY
 from rss_shield.shield.junctions.plans import KNOWN
 
@@ -51,7 +52,12 @@ def shield_everybody(road: Any, settings: Settings) -> None:
     Args:
       road: highway-env's road.
       settings: of the ego; its duties hold for everybody.
+
+    Raises:
+      ValueError: a road with pedestrians, or of which the ego does not see everything.
     """
+    if isinstance(road, Watched):
+        raise ValueError("traffic = 'compliant': expected 'stock' among pedestrians and where somebody may be hidden")
     duties = settings._replace(overrides=True, entry=PRIORITY)
     there = [v for v in road.vehicles if isinstance(v, ControlledVehicle) and v.collidable]
     shields = [shield_on(v) for v in there]

@@ -82,11 +82,11 @@ def _at_junctions(ego: JunctionEgo, names: list[str], frames: int) -> np.ndarray
             rules = settings.entry, not settings.waits_anywhere
             if target != before and target[:2] == before[:2]:
                 changed = ego._scene_of(*ego._look())
-                if not has_plan(changed, ego.crossings, *rules):
+                if not has_plan(changed, ego._remembered(len(ego.samples)), *rules):
                     continue
             scene, speed = ego._scene(), float(vehicle.target_speed)
             first[a] = first_override(
-                scene, ego.samples, ego.crossings, ego.plan, speed, frames, *rules, settings.examine
+                scene, ego.samples, ego._remembered(len(ego.samples)), ego.plan, speed, frames, *rules, settings.examine
             )
     return first
 

@@ -119,7 +119,7 @@ class JunctionEgo(ShieldedEgo):
         report: JunctionReport = junction_frame(
             scene,
             self.samples,
-            self.crossings,
+            self._remembered(len(self.samples)),
             self.plan,
             acceleration,
             settings.entry,
@@ -149,14 +149,32 @@ class JunctionEgo(ShieldedEgo):
         self._meet()
         path = self.path
         scene = self._scene_of(*self._look())
-        if not has_plan(scene, self.crossings, settings.entry, not settings.waits_anywhere):
+        if not has_plan(scene, self._remembered(len(self.samples)), settings.entry, not settings.waits_anywhere):
             vehicle.target_lane_index, self.path = before, path
             self.refused = True
 
     def _look(self):
         """The ego's track, the ways of all others, and the roads."""
+        junction = self.junction
+        cars = self.cars = self._cars()
+        if self.judging:  # a contact flags both cars at once
+            cars["wreck"][: len(self.crossings)] = self.crossings["wreck"]
+        roads, settings = junction.roads, self.settings
+        track = track_of(roads, cars[-1], self.path)
+        self.path = track.path
+        self.samples = np.zeros(len(cars) - 1, SAMPLE)
+        remembered = self._remembered(len(self.samples))
+        common = (roads, track, cars[:-1], remembered, settings.intent, settings.table.other.v_cap, self.samples)
+        count = list_threats(*common, self.room, self.box)
+        if count > len(self.room):
+            self.room = np.zeros(2 * count, THREAT)
+            count = list_threats(*common, self.room, self.box)
+        return track, self.room[:count], roads
+
+    def _cars(self) -> np.ndarray:
+        """Everybody else and the ego, which comes last, as `CAR_ON_ROAD`."""
         vehicle, junction = self.vehicle, self.junction
-        cars = self.cars = np.zeros(len(self.others) + 1, CAR_ON_ROAD)
+        cars = np.zeros(len(self.others) + 1, CAR_ON_ROAD)
         for car, v, size in zip(cars, [*self.others, vehicle], [*self.size_numbers, 0], strict=True):
             car["x"], car["y"] = v.position
             car["heading"], car["speed"], car["length"], car["width"] = v.heading, v.speed, v.LENGTH, v.WIDTH
@@ -167,18 +185,11 @@ class JunctionEgo(ShieldedEgo):
             heads_for, route = self._declared(v)
             if heads_for is not None:
                 car["lane"], car["choice"] = junction.number[heads_for], junction.choice(heads_for, route)
-        if self.judging:  # a contact flags both cars at once
-            cars["wreck"][:-1] = self.crossings["wreck"]
-        roads, settings = junction.roads, self.settings
-        track = track_of(roads, cars[-1], self.path)
-        self.path = track.path
-        self.samples = np.zeros(len(self.others), SAMPLE)
-        common = (roads, track, cars[:-1], self.crossings, settings.intent, settings.table.other.v_cap, self.samples)
-        count = list_threats(*common, self.room, self.box)
-        if count > len(self.room):
-            self.room = np.zeros(2 * count, THREAT)
-            count = list_threats(*common, self.room, self.box)
-        return track, self.room[:count], roads
+        return cars
+
+    def _remembered(self, count: int) -> np.ndarray:
+        """`[N]` CROSSING: what is remembered of those who are sampled."""
+        return self.crossings
 
     def _declared(self, vehicle) -> tuple:
         """Lane that a driver heads for, None = nobody knows, and its route."""
@@ -212,6 +223,7 @@ class JunctionEgo(ShieldedEgo):
         line["user"] = line["path"] = -1
         line["from_cell"], line["to_cell"] = cell, roads.paths.cells[track.path]
         line["from_cell_beside"], line["to_cell_beside"] = NEVER, -1
+        line["arrives"], line["yields"] = 0.0, False
         return self.room[: count + 1]
 
     def _rank(self, road: SignalisedRoad, other, threat) -> None:

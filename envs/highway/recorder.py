@@ -17,6 +17,7 @@ from rss_shield.envs.options import LANES
 from rss_shield.envs.roads.slip import steering_of
 from rss_shield.envs.roads.traced import configuration, lane_id, lanes_of
 from rss_shield.envs.worlds.signalised import LINE, SignalisedRoad
+from rss_shield.envs.worlds.walkers import ERRANDS, Walker
 from rss_shield.shield.definitions.kinematics import stopping_distance
 from rss_shield.shield.definitions.signals import GREEN, RED, YELLOW
 from rss_shield.shield.junctions.conflict_areas import CELL, X, Y, cell_of
@@ -249,6 +250,18 @@ class Film:
             "mode": "off",
             "integration": "euler",
         }
+        walkers = [(row, user) for row, user in enumerate(self.users) if isinstance(user, Walker)]
+        if walkers:  # who they are, and on which sample the ego saw them first; -1 = never
+            meta["pedestrians"] = [
+                {
+                    "row": row,
+                    "errand": ERRANDS[walker.errand.kind],
+                    "place": list(walker.place),
+                    "reasonable": walker.is_reasonable,
+                    "first_seen": int(getattr(walker, "first_seen", -1)),
+                }
+                for row, walker in walkers
+            ]
         if isinstance(self.road, SignalisedRoad):
             meta |= {"clock": self.clock, "rights": self.rights}
         if shield is not None:
@@ -346,14 +359,14 @@ def _see_plan(seen: dict[str, Any], shield: JunctionEgo, look: Look, film: Film)
         s, v = s + v * scene.table.dt, max(v + a * scene.table.dt, 0.0)
         a = throttle(scene, s, v)
     s += stopping_distance(v, scene.table.ego.a_min_brake)
-    area, area_user = _areas(scene)
+    (area, area_user), known = _areas(scene), shield.others  # who may be hidden is nobody who is known
     seen |= {
         "plan": PLANS.index("go" if go > 0 else "stop") if go >= 0 else 0,
         "path": number,
         "path_s": track.s,
         "plan_end": s if go >= 0 else np.nan,
         "area": area,
-        "area_user": np.array([film._row_of(shield.others[i]) if i >= 0 else -1 for i in area_user]),
+        "area_user": np.array([film._row_of(known[i]) if 0 <= i < len(known) else -1 for i in area_user]),
     }
     if not look.overridden:
         return -1
@@ -414,6 +427,8 @@ def _events(trace: Trace, noted: list[Event], hit: dict[int, int]) -> tuple[Even
 
 
 def _kind(user: Any) -> str:
+    if isinstance(user, Walker):
+        return "pedestrian"
     if not hasattr(user, "action"):
         return "obstacle"
     return "truck" if user.LENGTH > _TRUCK else "car"

@@ -12,8 +12,10 @@ from rss_shield.envs.highway.compliant import TurnTaker
 from rss_shield.envs.highway.ego import ShieldedEgo, log_of
 from rss_shield.envs.highway.free_ego import FreeEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
+from rss_shield.envs.highway.people_ego import PeopleEgo
 from rss_shield.envs.highway.sliding_ego import SlidingEgo
 from rss_shield.envs.options import LANES, Options, Settings
+from rss_shield.envs.worlds.walkers import Watched
 from rss_shield.shield.lanes.judge import Audit, audit
 from rss_shield.shield.tally import JUDGED, end_decision, info_at, shield_infos, start_decision
 from rss_shield.shield.verdicts import AT_FAULT
@@ -45,6 +47,8 @@ def attach(
         return (SlidingEgo if isinstance(vehicle, BicycleVehicle) else ShieldedEgo)(vehicle, settings, record)
     if not isinstance(vehicle, ControlledVehicle):
         return FreeEgo(vehicle, settings, record, destination)
+    if isinstance(vehicle.road, Watched):
+        return PeopleEgo(vehicle, settings, record)
     return (TurnTaker if takes_turns and settings.overrides else JunctionEgo)(vehicle, settings, record)
 
 

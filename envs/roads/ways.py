@@ -577,4 +577,5 @@ def _add_obstacle(roads, track, i, car, threat, box):
     box[HALF_LENGTH], box[HALF_WIDTH] = 0.5 * (length + roll), 0.5 * car.width
     threat.user, threat.path, threat.s, threat.v = i, -1, 0.0, max(car.speed, 0.0)
     threat.half_length, threat.wreck, threat.cap, threat.priority = 0.5 * car.length, True, 0.0, 0
+    threat.arrives, threat.yields = 0.0, False
     block(roads.paths, track, box, threat)

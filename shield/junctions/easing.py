@@ -86,7 +86,7 @@ def _before_line(scene, at_line, rate):
         end = end if end > here else cells
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
-        if threat.path < 0 and here < threat.from_cell:
+        if threat.path < 0 and threat.arrives == 0.0 and here < threat.from_cell:
             end = min(end, threat.from_cell)
     if end == cells:
         return np.inf, -np.inf

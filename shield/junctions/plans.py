@@ -156,6 +156,8 @@ def meets(scene, s, slack, threat, t, resting):
     track, other = scene.track, scene.table.other
     leaves = track.beside >= 0 and (t <= track.leaves_after or s <= track.leaves_at)
     if threat.path < 0:
+        if threat.yields if resting else t < threat.arrives:
+            return False
         return _overlaps(scene.paths, track.path, s, slack, threat.from_cell, threat.to_cell) or (
             leaves
             and _overlaps(

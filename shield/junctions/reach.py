@@ -38,6 +38,8 @@ THREAT = np.dtype(
         ("to_cell", "i8"),
         ("from_cell_beside", "i8"),  # likewise of the path of the lane that it is leaving
         ("to_cell_beside", "i8"),
+        ("arrives", "f8"),  # it is in these cells from then on only [s]
+        ("yields", "?"),  # it walks around whoever has come to rest there
     ],
     align=True,
 )
