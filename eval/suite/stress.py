@@ -101,7 +101,7 @@ def play(block: Block, threads: int = 1) -> dict[str, Any]:
     envs: list[Watched] = []
 
     def made(n: int) -> Any:
-        options = {"params": block.params or None, "config": block.config, "threads": threads}
+        options: dict[str, Any] = {"params": block.params or None, "config": block.config, "threads": threads}
         env = make_vec(block.env_id, n, block.shield, autoreset_mode=AutoresetMode.DISABLED, **options)
         envs.append(Watched(env, block.judged))
         return envs[-1]
