@@ -126,7 +126,7 @@ def open_space_pairs(times, ego, other, driver, steering, rows):
     """From two states to the answer of Def. 22, again and again; how often it was "dangerous"."""
     dangerous = 0
     for k in range(times):
-        moved = Mover(ego.x + 1e-9 * k, ego.y, ego.heading, ego.v, ego.yaw_rate, ego.half_length, ego.half_width)
+        moved = Mover(ego.x + 1e-9 * k, ego.y, ego.heading, ego.v, ego.yaw_rate, ego.half_length, ego.half_width, 0.0)
         bounds_1 = occupy(moved, driver, steering, 0.1, rows[0], rows[1])
         bounds_2 = occupy(other, driver, steering, 0.1, rows[2], rows[3])
         one = Occupancy(moved, bounds_1, rows[0], rows[1])

@@ -11,6 +11,7 @@ from highway_env.envs.highway_env import HighwayEnv
 from highway_env.envs.intersection_env import IntersectionEnv
 from highway_env.envs.lane_keeping_env import LaneKeepingEnv
 from highway_env.envs.merge_env import MergeEnv
+from highway_env.envs.parking_env import ParkingEnv
 from highway_env.envs.racetrack_env import RacetrackEnv
 from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
@@ -26,11 +27,13 @@ from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
 from rss_shield.shield.junctions.plans import ANY, INTENTS
 from rss_shield.shield.lanes.correction import CORRECTIONS, NEAREST
+from rss_shield.shield.open_space.frames import WHEELS
 from rss_shield.shield.params import Preset, RSSParams, Rules, Table
 from rss_shield.shield.risk import RiskSettings
 from rss_shield.shield.table import table_for
 
-LANES, PLANS = range(2)  # distances along the lane (Defs. 1-10), or plans through junctions (Defs. 14-18)
+# distances along the lane (Defs. 1-10), plans through junctions (14-18), trajectories where nothing is marked (19-22)
+LANES, PLANS, OPEN_SPACE = range(3)
 MODES = ("override", "monitor")
 WAITING = ("line", "anywhere")
 CAR_MASS = 1500.0  # of everybody [kg]: highway-env's vehicles have none
@@ -41,7 +44,8 @@ SUPPORTED = (
     "highway-v0, highway-fast-v0, two-way-v0, merge-v0/-v1, merge-generic-v0/-v1, exit-v0/-v1, u-turn-v0/-v1, "
     "racetrack-v0/-v1, racetrack-large-v0/-v1, racetrack-oval-v0/-v1, lane-keeping-v0, roundabout-v0/-v1, "
     "roundabout-generic-v0/-v1, intersection-v0/-v1/-v2, intersection-multi-agent-v0/-v1/-v2, "
-    "signalised-intersection-v0, crosswalk-v0, parked-row-v0, occluded-intersection-v0"
+    "signalised-intersection-v0, crosswalk-v0, parked-row-v0, occluded-intersection-v0, "
+    "parking-v0, parking-parked-v0, parking-ActionRepeat-v0, shared-parking-v0"
 )
 Params = str | Preset | Sequence[RSSParams] | Mapping[str, Any] | None  # see `ShieldWrapper`
 _SCHEMES = {
@@ -49,6 +53,7 @@ _SCHEMES = {
     RoundaboutEnv: PLANS,
     IntersectionEnv: PLANS,
     StreetEnv: PLANS,
+    ParkingEnv: OPEN_SPACE,
 }
 _META_ONLY = (OccludedIntersectionEnv, StreetEnv)  # where people walk, a car has to keep to its route
 
@@ -58,7 +63,7 @@ class Settings(NamedTuple):
 
     table: Table
     overrides: bool  # False: watch only
-    scheme: int = LANES  # what keeps the ego safe: LANES or PLANS
+    scheme: int = LANES  # what keeps the ego safe: LANES, PLANS or OPEN_SPACE
     entry: int = CAUTIOUS  # whom the ego expects to give way: index into `shield.junctions.controller.ENTRIES`
     intent: int = ANY  # which routes it expects of others: index into `shield.junctions.plans.INTENTS`
     waits_anywhere: bool = False  # it may also wait inside a junction, in the way of nobody who is there yet
@@ -234,6 +239,11 @@ def check_kind(env: Any) -> None:
 
 def check_action_type(action_type: Any, env: Any) -> None:
     """Can the shield restrict what an agent may do with its car?"""
+    if isinstance(action_type, DiscreteMetaAction) and scheme_of(env) == OPEN_SPACE:
+        raise ValueError(
+            "action type DiscreteMetaAction is not supported where cars are parked, because it follows lanes; expected "
+            "ContinuousAction or DiscreteAction"
+        )
     if not isinstance(action_type, (DiscreteMetaAction, ContinuousAction)):
         raise ValueError(
             f"action type {type(action_type).__name__} is not supported; "
@@ -254,6 +264,9 @@ def _check_free_driving(action_type: ContinuousAction, env: Any) -> None:
                 f"action option dynamical = True with config simulation_frequency = {frequency}: expected >= "
                 f"{lowest:.0f} along lanes, because longer frames make a slow car whose tyres slip swing about"
             )
+        return
+    if scheme_of(env) == OPEN_SPACE:
+        _check_open_space(action_type)
         return
     if isinstance(env, _META_ONLY):
         raise ValueError(
@@ -282,6 +295,17 @@ def keeps_speed(env: Any, action_type: Any) -> bool:
     return isinstance(env, RacetrackEnv) and isinstance(action_type, ContinuousAction) and not action_type.longitudinal
 
 
+def _check_open_space(action_type: ContinuousAction) -> None:
+    if action_type.dynamical:
+        raise ValueError("action option dynamical = True: expected False where cars are parked")
+    low, high = action_type.steering_range
+    if not -WHEELS - 1e-9 <= low <= high <= WHEELS + 1e-9:
+        raise ValueError(
+            f"action option steering_range = {(low, high)}: expected within +-{WHEELS:.4f} rad where cars are parked, "
+            "because everybody relies on no car to turn tighter"
+        )
+
+
 def check_replace(options: Options, env: Any) -> None:
     """Can actions be replaced at the start of a decision, if that is asked for?"""
     if options.replace == "decision" and not isinstance(env.action_type, DiscreteMetaAction):
@@ -290,13 +314,21 @@ def check_replace(options: Options, env: Any) -> None:
 
 
 def scheme_of(env: Any) -> int:
-    """What keeps the ego safe in an environment: LANES or PLANS."""
+    """What keeps the ego safe in an environment: LANES, PLANS or OPEN_SPACE."""
     return next(scheme for kind, scheme in _SCHEMES.items() if isinstance(env, kind))
 
 
 def default_preset(env: Any) -> str:
     """Name of the preset that states the limits of an environment's traffic."""
+    if isinstance(env, ParkingEnv):
+        return "parking"
     return "intersection" if isinstance(env, IntersectionEnv) else "simulator"
+
+
+def check_traffic(traffic: str, env: Any) -> None:
+    """Compliant traffic follows lanes."""
+    if traffic != "stock" and scheme_of(env) == OPEN_SPACE:
+        raise ValueError(f"traffic = {traffic!r}: expected 'stock' where cars are parked: agents are all that drives")
 
 
 def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dict[str, Any]) -> Settings:
@@ -312,10 +344,28 @@ def settings_for(env: Any, params: Preset, rules: Rules, mode: str, conduct: dic
         rules = rules._replace(limits=False)
     if isinstance(env, LaneKeepingEnv):  # whose tyres slip, which the limits of lateral motion do not know
         rules = rules._replace(limits=False)
+    if scheme == OPEN_SPACE:
+        _check_open_table(params)
     _check_distances(scheme, conduct)
     if conduct["filter"].kind != RSS:  # nothing that is the shield's own acts beside another filter
         rules = rules._replace(take_back=False, anticipation=0.0)
     return Settings(table_for(params, rules, dt), mode == "override", scheme, **conduct)
+
+
+def _check_open_table(params: Preset) -> None:
+    """Where nothing is marked, everybody else sees in the ego one of the others: it must keep what is said of those."""
+    ego, other = params.ego, params.other
+    for name, kept in (
+        ("a_max_accel", ego.a_max_accel <= other.a_max_accel),
+        ("v_cap", ego.v_cap <= other.v_cap),
+        ("a_max_brake", ego.a_max_brake <= other.a_max_brake),
+        ("a_min_brake", other.a_min_brake <= ego.a_min_brake <= other.a_max_brake),
+    ):
+        if not kept:
+            raise ValueError(
+                f"params: {name} = {getattr(ego, name):g} of the ego is not within what holds for others "
+                f"({getattr(other, name):g}): expected so where cars are parked"
+            )
 
 
 def _check_distances(scheme: int, conduct: dict[str, Any]) -> None:
@@ -324,9 +374,11 @@ def _check_distances(scheme: int, conduct: dict[str, Any]) -> None:
         ("filter", conduct["filter"].kind, FILTERS),
         ("correction", conduct["correction"], CORRECTIONS),
     ):
-        if scheme == PLANS and index != 0:
-            raise ValueError(f"{name} = {known[index]!r}: expected {known[0]!r} where roads cross")
-    if conduct["evasion"] and scheme == PLANS:
-        raise ValueError("evasion = True: expected False where roads cross")
+        if scheme != LANES and index != 0:
+            where = "where roads cross" if scheme == PLANS else "where cars are parked"
+            raise ValueError(f"{name} = {known[index]!r}: expected {known[0]!r} {where}")
+    if conduct["evasion"] and scheme != LANES:
+        where = "where roads cross" if scheme == PLANS else "where cars are parked"
+        raise ValueError(f"evasion = True: expected False {where}")
     if conduct["evasion"] and conduct["filter"].kind != RSS:
         raise ValueError(f"evasion = True with filter = {FILTERS[conduct['filter'].kind]!r}: expected filter = 'rss'")

@@ -120,6 +120,12 @@ def _simulator(response_time: float, a_max_accel: float = 3.0) -> RSSParams:
     )
 
 
+def _parking(response_time: float) -> RSSParams:
+    return _simulator(response_time, a_max_accel=2.5)._replace(
+        a_min_brake=4.0, a_max_brake=5.0, standstill_gap=0.0, mu=0.0, v_cap=5.0
+    )
+
+
 class Road(NamedTuple):
     """Friction between tyres and a road [1]: at least, which is to be relied on, and at most, which is to be feared."""
 
@@ -182,6 +188,13 @@ PRESETS: dict[str, Preset] = {
         ego=_simulator(response_time=2 / 15, a_max_accel=6.0),
         other=_simulator(response_time=1.0, a_max_accel=6.0),
         source="as simulator, but at highway-env's intersections IDM accelerates at up to 6 m/s^2",
+        per_frame=True,
+    ),
+    "parking": Preset(
+        ego=_parking(response_time=1 / 15),
+        other=_parking(response_time=0.4),
+        source="a car park: the limits of highway-env's continuous actions, and no faster than 18 km/h; everybody "
+        "in it is driven by a machine that responds within 0.4 s",
         per_frame=True,
     ),
     "slides": Preset(

@@ -12,10 +12,12 @@ from rss_shield.shield.comfort import Comfort, comfort_of
 from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.junctions.plans import PLAN_NAMES
 from rss_shield.shield.lanes.controller import response_name
+from rss_shield.shield.open_space.pair import DANGER_NAMES
 from rss_shield.shield.verdicts import DUTIES, VERDICTS
 
 LONGEST_TTC = 100.0  # times to collision are reported up to this [s]
 BY_PLANS = len(AXES)  # kinds of danger from here on are plans
+IN_OPEN_SPACE = BY_PLANS + len(PLAN_NAMES)  # and from here on who has to brake where there are no lanes
 
 # The contact of the ego, once it has had one.
 _CONTACT = [
@@ -191,7 +193,8 @@ def _texts(texts: Any) -> np.ndarray:
     return np.array(list(texts), object)
 
 
-KINDS = _texts([*(AXES[axes] for axes in range(len(AXES))), *(PLAN_NAMES[kind] for kind in range(len(PLAN_NAMES)))])
+_ON_ROADS = [*(AXES[axes] for axes in range(len(AXES))), *(PLAN_NAMES[kind] for kind in range(len(PLAN_NAMES)))]
+KINDS = _texts([*_ON_ROADS, *DANGER_NAMES])
 _BLAMES, _DUTIES = _texts(["", *VERDICTS]), _texts(DUTIES)
 _RESPONSES = _texts(response_name(sum_of_bits) for sum_of_bits in range(16))
 

@@ -13,6 +13,8 @@ KEPT, TOO_FAR, TOO_SHORT, TOO_CLOSE, TOO_WEAK, TOO_HARD, TOWARD = range(7)
 LEFT_NO_PLAN, WAVERED, ACCELERATED, BRAKED, LEFT_PATHS, CRASHED, GAVE_NO_WAY, REVERSED, CUT_IN, TRAPPED = range(7, 17)
 # of and toward pedestrians, and whoever was hidden
 LEAPED, WALKED_IN, HURRIED, LEFT_CROSSING, UNREASONABLE, NO_CAUTION = range(17, 23)
+# in open space, where some of the above are owed, too
+STEERED = 23
 DUTIES = (
     "",
     "got farther along the lane than its share [m]",
@@ -37,6 +39,7 @@ DUTIES = (
     "left the crossing",
     "came out of hiding faster than is reasonable [m/s]",
     "drove too fast for who was hidden",
+    "turned while it had to brake [rad]",
 )
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")

@@ -41,7 +41,7 @@ OWES = {
     "shield.anything",
     "shield.comfort",
 }
-KEEPERS = {"shield.lanes", "shield.junctions", "shield.people", "shield.filters"}
+KEEPERS = {"shield.lanes", "shield.junctions", "shield.open_space", "shield.people", "shield.filters"}
 BELOW = LAWS | OWES | KEEPERS | {"shield.tally", "shield.trace"}
 ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
 ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
@@ -54,6 +54,7 @@ MAY_IMPORT = {
     "shield.lanes": LAWS | OWES,
     "shield.junctions": LAWS | OWES | {"shield.lanes"},  # a verdict is one on either kind of road
     "shield.people": LAWS | OWES | {"shield.junctions"},  # pedestrians are threats to the same plans
+    "shield.open_space": LAWS | OWES | {"shield.lanes"},
     "shield.filters": LAWS | OWES | {"shield.lanes"},
     "envs._numpy": {"envs.compiled", "shield._numba"},
     "envs.compiled": {"envs._numpy", "shield._numba"},

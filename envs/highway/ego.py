@@ -7,7 +7,7 @@ import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
 from highway_env.vehicle.objects import Landmark
 
-from rss_shield.envs.options import LANES, PLANS, Settings
+from rss_shield.envs.options import LANES, OPEN_SPACE, PLANS, Settings
 from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, roads_along, tightest
 from rss_shield.envs.roads.slip import slip_of, steering_of
 from rss_shield.envs.roads.steering import MAX_SLIP
@@ -32,6 +32,7 @@ from rss_shield.shield.tally import (
     COUNTED,
     DECISION_FIELDS,
     EPISODE_FIELDS,
+    IN_OPEN_SPACE,
     count_change,
     count_frame,
     enter_contact,
@@ -511,6 +512,8 @@ class ShieldedEgo:
         # several at once: the one that weighs most against the ego counts
         pairs = zip(touching, self._verdicts(touching), strict=True)
         i, verdict = max(pairs, key=lambda pair: weight_of(pair[1].verdict))
+        if self.settings.scheme == OPEN_SPACE:
+            verdict = verdict._replace(kind=verdict.kind + IN_OPEN_SPACE)
         enter_contact(self.since, verdict, self._index_on_road(i), self.settings.scheme == PLANS)
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:

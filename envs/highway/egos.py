@@ -18,6 +18,7 @@ from rss_shield.envs.options import (
     Settings,
     check_mode,
     check_risk,
+    check_traffic,
     destination_of,
     keeps_speed,
     settings_for,
@@ -43,6 +44,7 @@ class EgoShields(gym.Wrapper):
         check_mode(mode)
         self.mode, self.options = mode, Options.of(given)
         self._check()
+        check_traffic(self.options.traffic, env.unwrapped)
         self.params, self.rules = self.options.params_in(env.unwrapped), rules_of(self.options.rules)
         self.judge = self.options.judge_in(env.unwrapped)
         self.risk = check_risk(self.options.risk)

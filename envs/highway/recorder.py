@@ -13,7 +13,8 @@ from rss_shield.envs.highway.ego import Look, ShieldedEgo
 from rss_shield.envs.highway.egos import EgoShields
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.highway.step import shield_on
-from rss_shield.envs.options import LANES
+from rss_shield.envs.options import LANES, OPEN_SPACE
+from rss_shield.envs.options import PLANS as BY_PLANS
 from rss_shield.envs.roads.slip import steering_of
 from rss_shield.envs.roads.traced import configuration, lane_id, lanes_of
 from rss_shield.envs.worlds.signalised import LINE, SignalisedRoad
@@ -40,6 +41,7 @@ from rss_shield.shield.trace import (
 from rss_shield.shield.verdicts import VERDICTS
 
 AREAS = 8  # stretches of an ego's path that others may be in the way of: so many are kept, the nearest
+_SCHEMES = {LANES: "lanes", BY_PLANS: "plans", OPEN_SPACE: "open space"}  # what kept the ego safe
 _SEEN_AHEAD = 80.0  # of its path [m]
 _TRUCK = 7.5  # longer vehicles are trucks [m]
 _SIGNALS = {GREEN: SIGNALS.index("green"), YELLOW: SIGNALS.index("yellow"), RED: SIGNALS.index("red")}
@@ -268,7 +270,7 @@ class Film:
             table, judge = shield.settings.table, (shield._judge or shield.settings).table
             meta |= {
                 "mode": shield.mode,
-                "scheme": "lanes" if shield.settings.scheme == LANES else "plans",
+                "scheme": _SCHEMES[shield.settings.scheme],
                 "params": {"ego": table.ego._asdict(), "other": table.other._asdict()},
                 "rules": table.rules._asdict(),
                 "judge_params": {"ego": judge.ego._asdict(), "other": judge.other._asdict()},
@@ -310,7 +312,7 @@ class _EgoFilm:
         partner = look.partner
         if isinstance(shield, JunctionEgo):
             partner = _see_plan(seen, shield, look, film)
-        else:
+        elif shield.settings.scheme == LANES:
             _see_neighbours(seen, shield, film)
         seen["partner"] = film._row_of(shield.others[partner]) if partner >= 0 else -1
         self.seen[t] = seen
@@ -431,6 +433,8 @@ def _kind(user: Any) -> str:
         return "pedestrian"
     if not hasattr(user, "action"):
         return "obstacle"
+    if getattr(user, "WALKS", False):
+        return "pedestrian"
     return "truck" if user.LENGTH > _TRUCK else "car"
 
 

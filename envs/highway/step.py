@@ -12,9 +12,10 @@ from rss_shield.envs.highway.compliant import TurnTaker
 from rss_shield.envs.highway.ego import ShieldedEgo, log_of
 from rss_shield.envs.highway.free_ego import FreeEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
+from rss_shield.envs.highway.open_ego import OpenSpaceEgo
 from rss_shield.envs.highway.people_ego import PeopleEgo
 from rss_shield.envs.highway.sliding_ego import SlidingEgo
-from rss_shield.envs.options import LANES, Options, Settings
+from rss_shield.envs.options import LANES, OPEN_SPACE, Options, Settings
 from rss_shield.envs.worlds.walkers import Watched
 from rss_shield.shield.lanes.judge import Audit, audit
 from rss_shield.shield.tally import JUDGED, end_decision, info_at, shield_infos, start_decision
@@ -45,6 +46,8 @@ def attach(
         return ego
     if settings.scheme == LANES:
         return (SlidingEgo if isinstance(vehicle, BicycleVehicle) else ShieldedEgo)(vehicle, settings, record)
+    if settings.scheme == OPEN_SPACE:
+        return OpenSpaceEgo(vehicle, settings, record)
     if not isinstance(vehicle, ControlledVehicle):
         return FreeEgo(vehicle, settings, record, destination)
     if isinstance(vehicle.road, Watched):
@@ -144,12 +147,13 @@ def audit_of(ego: ShieldedEgo) -> Audit:
     """For every recorded dangerous pair-frame of one ego: did it keep its duty?
 
     Raises:
-      ValueError: roads cross; recorded frames hold distances along a lane, and the duties there are others.
+      ValueError: roads cross, or cars are parked; recorded frames hold distances along a lane, and the duties there
+        are others.
     """
     settings, frames = ego.judge.settings, ego.judge.record or []
     if settings.scheme != LANES:
         raise ValueError(
-            "audit: expected an environment without junctions; where roads cross, infos count the pair-frames: "
-            "episode_dangerous_pairs, episode_broken_duties"
+            "audit: expected an environment without junctions; where roads cross or cars are parked, infos count the "
+            "pair-frames: episode_dangerous_pairs, episode_broken_duties"
         )
     return audit(log_of(frames), settings.table)

@@ -32,8 +32,8 @@ from rss_shield.shield.definitions.kinematics import (
 from rss_shield.shield.params import RSSParams
 
 MAX_STEPS = 62  # of an occupancy: one bit each
-LO, HI, RIGHT, LEFT, COS_RIGHT, SIN_RIGHT, COS_LEFT, SIN_LEFT, ANEW = range(9)
-ROW_FIELDS = 9
+LO, HI, RIGHT, LEFT, COS_RIGHT, SIN_RIGHT, COS_LEFT, SIN_LEFT, ANEW, WIDER = range(10)
+ROW_FIELDS = 10
 
 # how a road user that came to rest within its response time may set out again
 STAYS_PUT, BACKWARDS, ANY_WAY = 0, 1, 2
@@ -53,6 +53,7 @@ class Mover(NamedTuple):
     yaw_rate: float  #                                 [rad/s]
     half_length: float  # of its box                   [m]
     half_width: float  #                               [m]
+    offset: float = 0.0  # of the box's centre, ahead of x, y, which is the point that moves along the heading [m]
 
 
 class Steering(NamedTuple):
@@ -205,8 +206,11 @@ class Bounds(NamedTuple):
     turns_around: bool  # after which its box may point anywhere
     cos: float  # of its heading
     sin: float
-    diagonal: float  # half of its box's                                                [m]
-    corner: float  # angle between the heading and a corner                             [rad]
+    diagonal: float  # farthest that its box gets from x, y                             [m]
+    front: float  # a front corner's distance from x, y                                 [m]
+    rear: float  # a rear one's                                                         [m]
+    front_corner: float  # angle between the heading and a front corner                 [rad]
+    rear_corner: float  # and a rear one                                                [rad]
 
 
 class Occupancy(NamedTuple):
@@ -214,7 +218,8 @@ class Occupancy(NamedTuple):
 
     Each row is one step: the distance covered in it, at least and at most (LO, HI) [m]; the angles up to which the
     road user may have turned by its end, to the right and to the left (RIGHT, LEFT) [rad, >= 0], with their cosines and
-    sines; and how far one that came to rest may have walked off (ANEW) [m].
+    sines; how far one that came to rest may have walked off (ANEW) [m]; and by how much its box counts as wider on all
+    sides (WIDER) [m].
     """
 
     mover: Mover
@@ -230,7 +235,8 @@ def occupy(mover, driver, steering, dt, braking, going_on):
     _fill(braking, mover, driver, steering, dt, True)
     _fill(going_on, mover, driver, steering, dt, False)
     turns_around = steering.sets_out == ANY_WAY
-    return Bounds(
+    return bounds_of(
+        mover,
         int(np.ceil(time_to_stop(mover.v, rho, a, b, v_cap) / dt - 1e-9)),
         int(mover.v / driver.a_max_brake / dt),
         reach(mover.v, rho, a, b, v_cap),
@@ -238,10 +244,29 @@ def occupy(mover, driver, steering, dt, braking, going_on):
         b * dt**2 / 8,
         0.5 * mover.v * rho if turns_around else 0.0,
         turns_around,
+    )
+
+
+@compiled
+def bounds_of(mover, steps, first_stop, reach, least, slack, detour, turns_around):
+    """`Bounds` with what follows from the box of a `Mover`."""
+    ahead, behind, aside = mover.offset + mover.half_length, mover.offset - mover.half_length, mover.half_width
+    front, rear = np.hypot(ahead, aside), np.hypot(behind, aside)
+    return Bounds(
+        steps,
+        first_stop,
+        reach,
+        least,
+        slack,
+        detour,
+        turns_around,
         np.cos(mover.heading),
         np.sin(mover.heading),
-        np.hypot(mover.half_length, mover.half_width),
-        np.arctan2(mover.half_width, mover.half_length),
+        larger(front, rear),
+        front,
+        rear,
+        np.arctan2(aside, ahead),
+        np.arctan2(aside, behind),
     )
 
 
@@ -283,7 +308,7 @@ def _fill(rows, mover, driver, steering, dt, brakes):
             rows[k, RIGHT], rows[k, LEFT] = right, left
             rows[k, COS_RIGHT], rows[k, SIN_RIGHT] = np.cos(right), np.sin(right)
             rows[k, COS_LEFT], rows[k, SIN_LEFT] = np.cos(left), np.sin(left)
-        rows[k, ANEW] = 0.0
+        rows[k, ANEW] = rows[k, WIDER] = 0.0
         if steering.sets_out == ANY_WAY:
             rows[k, ANEW] = _set_out(t - v / driver.a_max_brake, rho - v / driver.a_max_brake, driver, brakes)
 
@@ -348,7 +373,9 @@ class _Side(NamedTuple):
 
     angle: float  # of the direction
     back: float  # of the opposite one
-    corners: tuple[float, float, float, float]  # to which it would have to turn for a corner to point there
+    # to which it would have to turn for a corner to point there
+    front_corners: tuple[float, float]
+    rear_corners: tuple[float, float]
     cos: float  # of the angle
     sin: float
 
@@ -368,11 +395,15 @@ def _side(occupancy, nx, ny):
     x, y = occupancy.bounds.cos, occupancy.bounds.sin
     cos, sin = nx * x + ny * y, ny * x - nx * y
     angle = np.arctan2(sin, cos)
-    front_right, front_left = angle - occupancy.bounds.corner, angle + occupancy.bounds.corner
-    front_right = front_right + 2 * np.pi if front_right < -np.pi else front_right
-    front_left = front_left - 2 * np.pi if front_left >= np.pi else front_left
-    corners = front_right, front_left, _opposite(front_right), _opposite(front_left)
-    return _Side(angle, _opposite(angle), corners, cos, sin)
+    front, rear = _both_sides(angle, occupancy.bounds.front_corner), _both_sides(angle, occupancy.bounds.rear_corner)
+    return _Side(angle, _opposite(angle), front, rear, cos, sin)
+
+
+@inner
+def _both_sides(angle, corner):
+    """`angle` less and plus `corner`, which is in [0, pi]."""
+    right, left = angle - corner, angle + corner
+    return right + 2 * np.pi if right < -np.pi else right, left - 2 * np.pi if left >= np.pi else left
 
 
 @inner
@@ -409,17 +440,26 @@ def _advance(row, side, cos):
 
 @inner
 def _half_box(row, side, occupancy):
-    """How far a box extends from its centre in a direction, at any heading of a step [m]."""
-    length, width = occupancy.mover.half_length, occupancy.mover.half_width
-    front_right, front_left, rear_left, rear_right = side.corners
-    a_corner_may = _may_point(row, front_right) or _may_point(row, front_left)
-    if a_corner_may or _may_point(row, rear_left) or _may_point(row, rear_right) or occupancy.bounds.turns_around:
-        return occupancy.bounds.diagonal
-    at_right = length * np.abs(side.cos * row[COS_RIGHT] + side.sin * row[SIN_RIGHT])
-    at_right += width * np.abs(side.sin * row[COS_RIGHT] - side.cos * row[SIN_RIGHT])
-    at_left = length * np.abs(side.cos * row[COS_LEFT] - side.sin * row[SIN_LEFT])
-    at_left += width * np.abs(side.sin * row[COS_LEFT] + side.cos * row[SIN_LEFT])
-    return larger(at_right, at_left)
+    """How far a box extends from x, y in a direction, at any heading of a step [m]."""
+    bounds, mover = occupancy.bounds, occupancy.mover
+    if bounds.turns_around:
+        return bounds.diagonal + row[WIDER]
+    cos, sin = side.cos, side.sin
+    c_right, s_right, c_left, s_left = row[COS_RIGHT], row[SIN_RIGHT], row[COS_LEFT], row[SIN_LEFT]
+    at_right = _box_at(cos * c_right + sin * s_right, sin * c_right - cos * s_right, mover)
+    at_left = _box_at(cos * c_left - sin * s_left, sin * c_left + cos * s_left, mover)
+    most = larger(at_right, at_left)
+    if _may_point(row, side.front_corners[0]) or _may_point(row, side.front_corners[1]):
+        most = larger(most, bounds.front)
+    if _may_point(row, side.rear_corners[0]) or _may_point(row, side.rear_corners[1]):
+        most = larger(most, bounds.rear)
+    return most + row[WIDER]
+
+
+@inner
+def _box_at(cos, sin, mover):
+    """How far a box extends in a direction that is at an angle, of this cosine and sine, to its heading [m]."""
+    return mover.offset * cos + mover.half_length * np.abs(cos) + mover.half_width * np.abs(sin)
 
 
 @inner
@@ -472,6 +512,14 @@ def _steps_apart(one, rows_1, two, rows_2, nx, ny, steps, eps):
 
 
 @inner
+def _between_centres(one, two):
+    """From the centre of one box to that of the other at the start [m]."""
+    first, second = one.mover, two.mover
+    dx = second.x + second.offset * two.bounds.cos - first.x - first.offset * one.bounds.cos
+    return dx, second.y + second.offset * two.bounds.sin - first.y - first.offset * one.bounds.sin
+
+
+@inner
 def _all(steps):
     return (np.int64(1) << np.int64(steps)) - np.int64(1)
 
@@ -484,14 +532,15 @@ def steps_apart(one, rows_1, two, rows_2, steps, eps):
     it looks in is the same for both road users.
     """
     first, second = one.mover, two.mover
-    centres = np.arctan2(second.y - first.y, second.x - first.x)
+    dx, dy = _between_centres(one, two)
+    centres = np.arctan2(dy, dx)
     found, wanted = np.int64(0), _all(steps)
     for backwards in range(2):
         for j in range(12):
             start = centres if j < 4 else (first.heading if j < 8 else second.heading)
             angle = start + 0.25 * np.pi * (j % 4)
             nx, ny = np.cos(angle), np.sin(angle)
-            along = (second.x - first.x) * nx + (second.y - first.y) * ny
+            along = dx * nx + dy * ny
             if backwards and np.abs(along) > one.bounds.least + two.bounds.least:
                 continue  # nobody is sure to get past the other in this direction
             if (along < 0.0) != (backwards == 1):
@@ -597,7 +646,7 @@ def _meet_straight_ahead(one, two, steps):
         least_2, most_2 = least_2 + two.braking[k, LO], most_2 + two.braking[k, HI]
     first, second = one.mover, two.mover
     length_1, length_2 = first.half_length + 0.5 * (most_1 - least_1), second.half_length + 0.5 * (most_2 - least_2)
-    middle_1, middle_2 = 0.5 * (least_1 + most_1), 0.5 * (least_2 + most_2)
+    middle_1, middle_2 = first.offset + 0.5 * (least_1 + most_1), second.offset + 0.5 * (least_2 + most_2)
     c_1, s_1, c_2, s_2 = one.bounds.cos, one.bounds.sin, two.bounds.cos, two.bounds.sin
     dx = second.x + middle_2 * c_2 - first.x - middle_1 * c_1
     dy = second.y + middle_2 * s_2 - first.y - middle_1 * s_1

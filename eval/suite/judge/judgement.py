@@ -77,8 +77,12 @@ def judge_trace(
       users: from whose views; None = everybody's.
 
     Raises:
-      ValueError: no such preset.
+      ValueError: no such preset, or nothing is marked where the log is from: lanes and plans say nothing there.
     """
+    if trace.meta.get("scheme") == "open space":
+        raise ValueError(
+            "trace.meta.scheme = 'open space': expected 'lanes' or 'plans'; the shield itself judged there"
+        )
     trace, noise = filled_in(trace)
     table = table_of(trace, params, rules)
     chosen = list(range(len(trace.users.ids))) if users is None else users

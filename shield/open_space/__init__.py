@@ -1,0 +1,1 @@
+"""Cars kept safe by trajectories, where there are no lanes (Defs. 19-22)."""
