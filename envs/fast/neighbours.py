@@ -15,7 +15,7 @@ from rss_shield.envs.roads.lanes import reach_of, road_through
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
 from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
-from rss_shield.shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
+from rss_shield.shield.geometry import COS, SIN, is_straight
 from rss_shield.shield.lanes.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
 from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame
 from rss_shield.shield.lanes.memory import MEMORY, forget_safe
@@ -71,11 +71,6 @@ def compile_lane_frames(network, settings: Settings) -> LaneFrames:
     lanes = [road_through(network, index, reach) for index in network.lanes_dict()]
     same = np.array([[same_frame(a, b) for b in lanes] for a in lanes])
     return LaneFrames(np.concatenate(lanes), np.cumsum([0, *map(len, lanes)]), same)
-
-
-def no_lane_frames() -> LaneFrames:
-    """Stands in where no shield runs."""
-    return LaneFrames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), np.zeros((0, 0), bool))
 
 
 def make_past(num_envs: int, n: int) -> Past:
