@@ -2,6 +2,7 @@
 
     python bench/engine.py                                highway-fast-v0, highway-v0, intersection-v0
     python bench/engine.py --growth                       and growth with vehicles, environments, threads
+    python bench/engine.py --against envpool --write      beside EnvPool, and between the marks of docs/performance.md
 
 Random actions; observations, infos and autoreset included; one thread, so figures are per core. All
 candidates take turns for several rounds, and ratios are medians over the rounds: the speed of a
@@ -12,13 +13,17 @@ import dataclasses
 import resource
 import sys
 import time
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import tyro
+from head_to_head import library, measure, table
 
 import rss_shield
+from rss_shield.eval.pages import fill
 
+PAGE = Path("docs/performance.md")
 SIZES = (1, 64, 1024, 4096)
 VEHICLES = (20, 50, 100, 200, 400)
 ENVIRONMENTS = (64, 256, 1024, 4096, 16384)
@@ -32,6 +37,8 @@ class Config:
     rounds: int = 5  # turns of every candidate
     seconds: float = 1.0  # of the engine per turn; highway-env gets four times as long
     growth: bool = False  # also measure growth with vehicles, environments and threads
+    against: Literal["", "envpool"] = ""  # beside this library instead of highway-env, if it is installed
+    write: bool = False  # put that on its page
 
 
 class Candidate:
@@ -115,7 +122,21 @@ def growth_with_threads(config: Config) -> None:
     print(f"two threads: {np.median(gains):.2f} x one thread", flush=True)
 
 
+def beside(config: Config) -> None:
+    """The same environments of another library."""
+    other = library(config.against)
+    if other is None:
+        return
+    rows = [measure(other, env_id, config.rounds, config.seconds) for env_id in config.envs]
+    text = table(rows, "EnvPool", other.__version__)
+    print(text)
+    if config.write:
+        fill(PAGE, config.against, text)
+
+
 def main(config: Config) -> None:
+    if config.against:
+        return beside(config)
     for env_id in config.envs:
         against_original(env_id, config)
     if config.growth:

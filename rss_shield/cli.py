@@ -16,6 +16,7 @@ COMMANDS = {
     "replay": ("rss_shield.eval.viewer.command", "train", "a page on which recorded episodes play"),
     "sweep": ("rss_shield.eval.suite.sweep", "train", "run every task of an experiment file, here or on a cluster"),
     "report": ("rss_shield.eval.paper.command", "train", "one page of what came out of runs and sweeps"),
+    "warm-up": ("rss_shield.warm_up", "train", "compile the engine now, so that the first run need not wait"),
 }
 _USAGE = "usage: rss-shield COMMAND [options]; rss-shield COMMAND --help lists the options\n\ncommands:\n"
 

@@ -27,6 +27,7 @@ from rss_shield.envs.fast.tasks import (
     ROUNDABOUT,
     SCENARIOS,
     TWO_WAY,
+    U_TURN,
     describe_of,
     destinations_of,
     rewards_of,
@@ -86,7 +87,7 @@ def compile_scenario(
     if env_id not in SCENARIOS:
         raise Unsupported(f"env_id = {env_id!r}", f"one of {', '.join(SCENARIOS)}")
     scenario = SCENARIOS[env_id]
-    _check_action(scenario, env_id, (config or {}).get("action") or {})
+    _check_action(scenario, env_id, config or {})
     wrapped = make_stock(env_id, config=config, max_episode_steps=max_episode_steps)
     env: Any = wrapped.unwrapped
     given = env.config
@@ -139,12 +140,16 @@ def compile_scenario(
     )
 
 
-def _check_action(scenario: int, env_id: str, asked: dict) -> None:
-    """Does the reward of the environment understand the action? In highway-env some do not."""
+def _check_action(scenario: int, env_id: str, config: dict) -> None:
+    """Do observation and reward of the environment understand the action? In highway-env some do not."""
+    asked = config.get("action") or {}
     kind = asked.get("type", "DiscreteMetaAction")
     two_axes = kind == "ContinuousAction" and asked.get("longitudinal", True) and asked.get("lateral", True)
     if kind != "DiscreteMetaAction" and scenario == TWO_WAY:
         raise Unsupported(f"action type {kind} in {env_id}", "DiscreteMetaAction")
+    by_default = "TimeToCollision" if scenario in (TWO_WAY, U_TURN) else ""
+    if kind != "DiscreteMetaAction" and (config.get("observation") or {}).get("type", by_default) == "TimeToCollision":
+        raise Unsupported(f"observation type TimeToCollision with {kind}", "DiscreteMetaAction, or another observation")
     if two_axes and scenario in (MERGE, MERGE_GENERIC, ROUNDABOUT):
         raise Unsupported(
             f"action type {kind} in {env_id}",

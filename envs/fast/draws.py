@@ -115,6 +115,20 @@ def integers(rng, n):
 
 
 @part
+def interval(rng, most):
+    """A whole number from 0 to `most` as `Generator.shuffle` draws it: masked bits until they fit."""
+    if most == 0:
+        return 0
+    mask = np.uint64(most)
+    for shift in (1, 2, 4, 8, 16):
+        mask |= mask >> np.uint64(shift)
+    drawn = next_32(rng) & mask
+    while drawn > np.uint64(most):
+        drawn = next_32(rng) & mask
+    return np.int64(drawn)
+
+
+@part
 def two_of(rng, n):
     """`Generator.choice(n, 2, replace=False)` of up to 10 000 things: Floyd's algorithm, then a shuffle."""
     first, second = integers(rng, n - 1), integers(rng, n)

@@ -21,23 +21,20 @@ from rss_shield.envs.fast.envs.intersection import let_traffic_flow, open_inters
 from rss_shield.envs.fast.foresight import foresee, make_desk
 from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.guard import (
-    MONITOR,
-    OFF,
-    OVERRIDE,
     Ways,
     carry_over,
     check_contact,
     compile_ways,
     distances_of,
     make_watch,
-    no_ways,
     plans_of,
     refuse_lane_change,
+    ride_of,
     start_watch,
     watch_frame,
 )
 from rss_shield.envs.fast.linear_drivers import start_habits
-from rss_shield.envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past, no_lane_frames
+from rss_shield.envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past
 from rss_shield.envs.fast.rating import is_truncated
 from rss_shield.envs.fast.risk import RISK, Field, begin_looks, compile_field, meter_of, report_risk, start_risk
 from rss_shield.envs.fast.sight import make_sight, sort_along_x
@@ -47,7 +44,7 @@ from rss_shield.envs.fast.threads import Crew
 from rss_shield.envs.fast.views.apart import call_of
 from rss_shield.envs.fast.views.record import NONE, View
 from rss_shield.envs.fast.views.usual import observe
-from rss_shield.envs.options import PLANS, Settings, scheme_of
+from rss_shield.envs.options import PLANS, Settings
 from rss_shield.envs.roads.lanes import tightest
 from rss_shield.envs.roads.network import Network
 from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, rare
@@ -72,7 +69,7 @@ class World(NamedTuple):
     config: np.ndarray  # `[1]` CONFIG
     flow: np.ndarray | None  # `[1]` FLOW where traffic comes and goes
     network: Network
-    # one of the two, even where no shield runs; numba compiles the kernel for either
+    # one of the two where a shield runs; numba compiles the kernel for either, and for none
     frames: LaneFrames | None
     ways: Ways | None
     # the rest is as in `Scenario`
@@ -90,10 +87,10 @@ class Batch(NamedTuple):
     cars: np.ndarray  # `[E, N]` CAR
     episodes: np.ndarray  # `[E]` EPISODE
     order: np.ndarray  # `[E, N]` indices sorted by x
-    # what the shield remembers; where there is none, N = 0
+    # what the shield remembers, if there is one
     past: Past | None  # with `World.frames`
     crossings: np.ndarray | None  # `[E, N]` CROSSING, with `World.ways`
-    rides: np.ndarray  # `[E]` RIDE
+    rides: np.ndarray | None  # `[E]` RIDE
     risks: np.ndarray | None  # `[E]` RISK, with `World.field`
 
 
@@ -137,17 +134,17 @@ def _populate(cars, episode, order, world, sight, flow):
 
 
 @inner
-def _go_on(cars, episode, order, world, plans, watch, mode, flow):
+def _go_on(cars, episode, order, world, plans, watch, flow):
     """Cars come and go between two decisions."""
     if flow is not None:
         was_ego = episode.ego
         let_traffic_flow(cars, episode, order, world.network, world.config[0], flow[0], world.linear)
-        if mode != OFF:
+        if plans is not None:
             carry_over(episode, cars, plans.crossings, was_ego, watch)
 
 
 @rare
-def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, mode, step, out):
+def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, out):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
     _populate(cars, episode, order, world, sight, world.flow)
@@ -158,7 +155,7 @@ def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, 
     start_risk(meter)
     start_decision(step)
     step.raw_reward = rate(cars, episode, NO_ACTION, lanes, sight, config, step)
-    _report(cars, episode, ride, mode, 0.0, step)
+    _report(cars, episode, ride, 0.0, step)
     _see_apart(cars, episode, world, sight, out)
 
 
@@ -174,19 +171,17 @@ def _see_apart(cars, episode, world, sight, out):
 
 
 @part
-def _report(cars, episode, ride, mode, cost, step):
+def _report(cars, episode, ride, cost, step):
     """Fill in what every step says."""
     ego = cars[episode.ego]
     step.speed, step.crashed, step.time = ego.speed, ego.crashed, episode.time
     step.episode_return, step.episode_length = episode.return_, episode.steps
-    if mode != OFF:
+    if ride is not None:
         end_decision(step, episode, ride, cost)
 
 
 @unfolded
-def _advance(
-    e, cars, episode, order, world, sight, distances, plans, ride, meter, watch, settings, mode, inputs, film, step
-):
+def _advance(e, cars, episode, order, world, sight, distances, plans, ride, meter, watch, settings, inputs, film, step):
     """One decision of one environment, frame by frame."""
     config, net, flow = world.config[0], world.network, world.flow
     lanes = net.lanes
@@ -201,21 +196,21 @@ def _advance(
                 label = world.labels[inputs.actions[e]]
                 before = ego.target_lane
                 take_meta_action(cars, episode.ego, label, net, lanes, sight, world.target_speeds)
-                if mode != OFF:
-                    refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, settings, step)
+                refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, settings, step)
             else:
                 ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
                 episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
         changing = look_around(cars, episode, order, net, sight, flow)
         # plans depend on the lanes that others head for, and those after the ego see the lane that it is given back:
         # the shield looks when those up to the ego have decided
-        in_turn = mode != OFF and (plans is not None or settings.table.rules.take_back)
+        in_turn = ride is not None and (plans is not None or settings.table.rules.take_back)
         first, last = 0, episode.ego + 1 if in_turn else episode.vehicles
         while first < episode.vehicles:  # a loop, lest the kernel contain it twice
             changing = think(cars, episode, first, last, changing, net, sight, config)
-            if first == 0 and mode != OFF:
-                watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watch, settings, step)
-                changing = note_change(cars, episode.ego, changing, sight)
+            if first == 0:
+                changing = _guard(
+                    cars, episode, changing, lanes, sight, distances, plans, ride, meter, watch, settings, step
+                )
             first, last = last, episode.vehicles
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
@@ -223,8 +218,23 @@ def _advance(
                 film.cars[film.slots[e], frame, i] = cars[i]
     episode.time += config.period
     episode.steps += 1
+    return _cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step)
+
+
+@inner
+def _guard(cars, episode, changing, lanes, sight, distances, plans, ride, meter, watch, settings, step):
+    """`watch_frame` where there is a shield; returns `changing`, with an ego that was given its lane back."""
+    if ride is None:
+        return changing
+    watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watch, settings, step)
+    return note_change(cars, episode.ego, changing, sight)
+
+
+@inner
+def _cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step):
+    """1.0 if the ego has broken its proper response in a decision, or a contact was its fault."""
     cost = 0.0
-    if mode != OFF:
+    if ride is not None:
         check_contact(cars, episode, lanes, sight, distances, plans, watch, settings)
         if step.broken_duties > 0 or (not had_contact and charges_ego(episode.blame - 1)):
             cost = 1.0
@@ -232,7 +242,7 @@ def _advance(
 
 
 @kernel
-def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings, mode, penalty, by_change, autoreset):
+def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings, penalty, by_change, autoreset):
     """One decision of the environments `first` to `last` - 1, resets included.
 
     Where observations are made apart from it, it waits for that after the decision: the next call goes on from there.
@@ -243,16 +253,17 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
             continue
         cars, episode, order, step = batch.cars[e], batch.episodes[e], batch.order[e], outputs.steps[e]
         distances, plans = distances_of(e, world.frames, batch.past), plans_of(e, world.ways, batch.crossings)
-        observation, ride, meter = outputs.observations[e], batch.rides[e], meter_of(e, world.field, batch.risks)
+        ride, meter = ride_of(e, batch.rides), meter_of(e, world.field, batch.risks)
+        observation = outputs.observations[e]
         if inputs.todo[e] == STAY:
             _start_outputs(e, outputs)
-            _report(cars, episode, ride, mode, 0.0, step)
+            _report(cars, episode, ride, 0.0, step)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = DONE
             continue
         if inputs.todo[e] == RESTART or (inputs.todo[e] == DECIDE and autoreset == NEXT_STEP and episode.ended):
             _start_outputs(e, outputs)
-            _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, mode, step, observation)
+            _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, observation)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = DONE
             continue
@@ -271,7 +282,6 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
                 meter,
                 watch,
                 settings,
-                mode,
                 inputs,
                 film,
                 step,
@@ -286,19 +296,19 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
             outputs.terminated[e] = is_terminated(cars, episode, lanes, sight, config)
             outputs.truncated[e] = is_truncated(episode, config)
             episode.ended = outputs.terminated[e] or outputs.truncated[e]
-            _report(cars, episode, ride, mode, cost, step)
+            _report(cars, episode, ride, cost, step)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = GO_ON
             if waits:
                 continue
         inputs.todo[e] = DONE
-        _go_on(cars, episode, order, world, plans, watch, mode, world.flow)
+        _go_on(cars, episode, order, world, plans, watch, world.flow)
         if episode.ended and autoreset == SAME_STEP:
             for k in range(len(observation)):
                 outputs.final_observations[e, k] = observation[k]
             outputs.final_steps[e] = step
             report_risk(e, meter, outputs.final_risks)
-            _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, mode, step, observation)
+            _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, observation)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = RESTART
 
@@ -338,18 +348,16 @@ class Engine:
         self.scenario = scenario
         self.num_envs = num_envs
         self.autoreset = autoreset
-        self.mode = OFF if settings is None else OVERRIDE if settings.overrides else MONITOR
         self.penalty, self.by_change = float(penalty), bool(by_change)
         self.settings = settings or Settings(table_for(PRESETS["simulator"], Rules(), 1.0), False)
         network, net = scenario.stock.road.network, scenario.network
-        watched = n if settings else 0
         frames = ways = past = crossings = None
-        if scheme_of(scenario.stock) == PLANS:
-            ways = compile_ways(network, net, float(scenario.config["dt"][0])) if settings else no_ways()
-            crossings = np.zeros((num_envs, watched), CROSSING)
-        else:
-            frames = compile_lane_frames(network, settings) if settings else no_lane_frames()
-            past = make_past(num_envs, watched)
+        if settings is not None and settings.scheme == PLANS:
+            ways = compile_ways(network, net, float(scenario.config["dt"][0]))
+            crossings = np.zeros((num_envs, n), CROSSING)
+        elif settings is not None:
+            frames = compile_lane_frames(network, settings)
+            past = make_past(num_envs, n)
         self.world = World(
             scenario.config,
             scenario.flow,
@@ -369,7 +377,7 @@ class Engine:
             np.zeros((num_envs, n), np.int64),
             past,
             crossings,
-            np.zeros(num_envs, RIDE),
+            None if settings is None else np.zeros(num_envs, RIDE),
             None if risk is None else np.zeros(num_envs, RISK),
         )
         frames_of_decision = np.zeros((0, int(scenario.config["frames"][0]), n), self.batch.cars.dtype)
@@ -382,8 +390,8 @@ class Engine:
         self._kernel: Callable[..., None] | None = None  # `run`, compiled for this engine
         self._foresees: Callable[..., None] | None = None  # `foresee`, likewise
         grids = [view.record[0] for view in (scenario.view, *(glance.view for glance in scenario.glances))]
-        sizes = len(net.lanes), n, *(max(grid[name] for grid in grids) for name in ("speeds", "lanes", "times"))
-        self._sights = [make_sight(*sizes, scenario.linear) for _ in range(threads)]
+        grid = [max(int(one[name]) for one in grids) for name in ("speeds", "lanes", "times")]
+        self._sights = [make_sight(len(net.lanes), n, grid, scenario.linear) for _ in range(threads)]
         self._watch = make_watch(self.settings.table.rules.heading_bound, tightest(network))
         self._calm = without_anticipation(self.settings)
         self._desks = [make_desk(n, len(scenario.labels)) for _ in range(threads)]
@@ -447,7 +455,7 @@ class Engine:
             None if self.batch.risks is None else np.zeros(e, RISK),
             None if self.batch.risks is None else np.zeros(e, RISK),
         )
-        rules = (self.settings, self.mode, self.penalty, self.by_change, self.autoreset)
+        rules = (self.settings, self.penalty, self.by_change, self.autoreset)
         common = (self.world, self.batch, inputs, outputs, self.film, self._watch, *rules)
         if self._kernel is None:
             self._kernel = _specialise(run, self._sights[0], *common)

@@ -22,7 +22,6 @@ from rss_shield.envs.roads.ways import (
     is_outside,
     junction_of,
     list_threats,
-    no_roads,
     track_of,
 )
 from rss_shield.shield._numba.compiled import inner, part, rare
@@ -42,7 +41,6 @@ from rss_shield.shield.lanes.memory import MEMORY, catch_up
 from rss_shield.shield.tally import count_change, count_frame, enter_contact, note_executed, start_episode
 from rss_shield.shield.verdicts import weight_of
 
-OFF, MONITOR, OVERRIDE = range(3)
 _MOST_TURNED = 0.9  # sine of the angle by which a bend may turn a car against its lane
 
 
@@ -87,11 +85,6 @@ def _choices(junction: Junction, network, net: Network) -> np.ndarray:
     return np.array([[junction.choice(index, route) for index in network.lanes_dict()] for route in [[], *routes]])
 
 
-def no_ways() -> Ways:
-    """Stands in where no shield runs."""
-    return Ways(no_roads(), np.zeros((1, 0), np.int64))
-
-
 def make_watch(heading_bound, curvature=0.0):
     """Tables for a `heading_bound` as in `Rules`, and the tightest bend of the roads [1/m]."""
     bound = max(heading_bound, min(curvature * CAR_LENGTH / 2, _MOST_TURNED))
@@ -102,7 +95,7 @@ def make_watch(heading_bound, curvature=0.0):
     return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING), MAX_SLIP)
 
 
-# Of the next two one is None, and numba leaves out of the kernel what it would need.
+# Of the next two one is None, or all three are, and numba leaves out of the kernel what it would need.
 
 
 @inner
@@ -121,6 +114,14 @@ def plans_of(e, ways, crossings):
     return Plans(ways, crossings[e])
 
 
+@inner
+def ride_of(e, rides):
+    """RIDE of environment `e` of a batch."""
+    if rides is None:
+        return None
+    return rides[e]
+
+
 @rare
 def start_watch(episode, distances, plans, ride, watch):
     """Forget everything at the start of an episode."""
@@ -129,7 +130,8 @@ def start_watch(episode, distances, plans, ride, watch):
     if plans is not None:
         for i in range(len(plans.crossings)):
             plans.crossings[i] = watch.blank_crossing[0]
-    start_ride(ride)
+    if ride is not None:
+        start_ride(ride)
     episode.room_left = episode.room_right = np.inf
     episode.path, episode.go, episode.frames_trapped = -1, -1, 0
     episode.held_at, episode.wronged, episode.answers, episode.evading = np.inf, False, False, False

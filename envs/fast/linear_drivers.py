@@ -26,7 +26,7 @@ _SPAN = np.concatenate(
 )
 
 
-def usual_habits(kind: type) -> np.ndarray | None:
+def usual_habits(kind: type[IDMVehicle]) -> np.ndarray | None:
     """`Scenario.linear` of a kind of vehicle, None for IDM.
 
     Raises:

@@ -15,7 +15,7 @@ from rss_shield.envs.roads.lanes import reach_of, road_through, turned_round
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
 from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
-from rss_shield.shield.geometry import COS, PIECE_FIELDS, SIN, is_straight
+from rss_shield.shield.geometry import COS, SIN, is_straight
 from rss_shield.shield.lanes.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
 from rss_shield.shield.lanes.far_pairs import least_margin, own_share
 from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame
@@ -81,11 +81,6 @@ def road_under(ego, index, lanes, sight):
     s = sight.s[ego.lane, index]
     against = np.cos(ego.heading - heading_at(lanes[ego.lane], s)) < 0.0
     return ego.lane + len(lanes) if against else ego.lane
-
-
-def no_lane_frames() -> LaneFrames:
-    """Stands in where no shield runs."""
-    return LaneFrames(np.zeros((0, PIECE_FIELDS)), np.zeros(1, int), np.zeros((0, 0), bool))
 
 
 def make_past(num_envs: int, n: int) -> Past:

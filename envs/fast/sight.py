@@ -74,8 +74,15 @@ class Sight(NamedTuple):
     linear: np.ndarray | None  # as in `World`
 
 
-def make_sight(n_lanes, n, speeds, lanes, times, linear):
-    """Fresh working memory."""
+def make_sight(n_lanes, n, grid=(0, 0, 0), linear=None):
+    """Fresh working memory.
+
+    Args:
+      n_lanes: of the roads.
+      n: road users.
+      grid: speeds, lanes and times of a time-to-collision grid.
+      linear: of the `Scenario`.
+    """
     return Sight(
         np.empty((n_lanes, n)),
         np.empty((n_lanes, n)),
@@ -93,7 +100,7 @@ def make_sight(n_lanes, n, speeds, lanes, times, linear):
         np.empty(max(n * (n - 1) // 2, 1), np.int64),
         np.empty((2, 4, 2)),
         np.empty(n, np.int64),
-        np.empty((speeds, lanes, times)),
+        np.empty(tuple(grid)),
         np.full(n, -1, np.int64),
         np.empty((n, MOMENTS + 2, 3)),
         np.empty(1, CAR if linear is None else LINEAR_CAR),

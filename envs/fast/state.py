@@ -17,44 +17,42 @@ OBSTACLE = 3  # `Obstacle`
 
 OBSTACLE_SIZE = 2.0  # [m]
 
-CAR = np.dtype(
-    [
-        ("x", "f8"),  # centre [m]
-        ("y", "f8"),
-        ("heading", "f8"),  # [rad]
-        ("speed", "f8"),  # [m/s]
-        ("cos", "f8"),  # of the heading
-        ("sin", "f8"),
-        ("acceleration", "f8"),  # command [m/s^2]
-        ("steering", "f8"),  # command [rad]
-        ("target_speed", "f8"),  # [m/s]
-        ("timer", "f8"),  # since the last thought about a lane change [s]
-        ("delta", "f8"),  # exponent of the driver's free acceleration
-        ("impact_x", "f8"),  # displacement due on the next step, if `hit` [m]
-        ("impact_y", "f8"),
-        ("length", "f8"),  # [m]
-        ("width", "f8"),
-        ("kind", "i8"),
-        ("lane", "i8"),  # lane it is on
-        ("target_lane", "i8"),  # lane it heads for
-        ("speed_index", "i8"),  # among the target speeds, of a META car
-        ("route", "i8"),  # row of the route tables, -1 = none
-        ("route_step", "i8"),  # steps of the route that lie behind
-        ("vice", "i8"),  # of a hostile driver, see `envs.roads.hostile`
-        ("crashed", "?"),
-        ("hit", "?"),  # an impact is due
-        ("checks", "?"),  # looks for collisions itself
-        ("changes_lane", "?"),
-        ("yields", "?"),  # told to give way at an intersection
-        ("was", "i8"),  # index before cars came and went, -1 = new
-    ],
-    align=True,
-)
+_OF_A_CAR = [
+    ("x", "f8"),  # centre [m]
+    ("y", "f8"),
+    ("heading", "f8"),  # [rad]
+    ("speed", "f8"),  # [m/s]
+    ("cos", "f8"),  # of the heading
+    ("sin", "f8"),
+    ("acceleration", "f8"),  # command [m/s^2]
+    ("steering", "f8"),  # command [rad]
+    ("target_speed", "f8"),  # [m/s]
+    ("timer", "f8"),  # since the last thought about a lane change [s]
+    ("delta", "f8"),  # exponent of the driver's free acceleration
+    ("impact_x", "f8"),  # displacement due on the next step, if `hit` [m]
+    ("impact_y", "f8"),
+    ("length", "f8"),  # [m]
+    ("width", "f8"),
+    ("kind", "i8"),
+    ("lane", "i8"),  # lane it is on
+    ("target_lane", "i8"),  # lane it heads for
+    ("speed_index", "i8"),  # among the target speeds, of a META car
+    ("route", "i8"),  # row of the route tables, -1 = none
+    ("route_step", "i8"),  # steps of the route that lie behind
+    ("vice", "i8"),  # of a hostile driver, see `envs.roads.hostile`
+    ("crashed", "?"),
+    ("hit", "?"),  # an impact is due
+    ("checks", "?"),  # looks for collisions itself
+    ("changes_lane", "?"),
+    ("yields", "?"),  # told to give way at an intersection
+    ("was", "i8"),  # index before cars came and went, -1 = new
+]
+CAR = np.dtype(_OF_A_CAR, align=True)
 
 # a driver of `LinearVehicle`, with what it weighs
 LINEAR_CAR = np.dtype(
     [
-        *[(name, CAR.fields[name][0]) for name in CAR.names or ()],
+        *_OF_A_CAR,
         ("gain_speed", "f8"),  # [1/s] of how much slower it is than it wants to be
         ("gain_approach", "f8"),  # [1/s] of how much faster it is than the car ahead
         ("gain_gap", "f8"),  # [1/s^2] of how much nearer that is than it wants

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rss_shield.envs.roads.bits import first_of, without_first
 from rss_shield.envs.roads.network import (
     CAR_LENGTH,
     CAR_WIDTH,
-    LANE,
     compile_network,
     heading_at,
     is_far,
@@ -67,7 +67,7 @@ _CLEAR, _DECAY, _TURN_TIME, _SLANT, _TURN_LENGTH = 1.5, 0.6, 0.4, 2.0, 3.0
 # While it changes lanes, a driver comes less far along the new lane than it drives: by at most this share of what is
 # left across, less from `_SWIFT` [m/s] on. In a bend it is further out, or in, until it has come nearer (`_DECAY`).
 _ASLANT, _SWIFT = 0.55, 4.0
-_ANY_LANE = _ALL = -1  # all bits
+_ALL = -1  # all bits
 _MOST_LANES = 63  # sets of lanes are bits
 # A car that is longer than stock ones turns with a larger slip: it may be off its lane by this much more
 # per metre, and turned by this angle more, but never as if it drove across.
@@ -109,37 +109,6 @@ class Roads(NamedTuple):
     beside: np.ndarray  # `[L]` each lane and those beside it, likewise
     alongside: np.ndarray  # `[Q, L]` path through each lane that runs as much as possible like each path
     onward: np.ndarray  # `[P, L]` path of stock cars through each lane that goes on like each; -1 = not by that road
-
-
-def no_roads() -> Roads:
-    """Stands in where no roads cross."""
-    none, rows = np.zeros((0, 0), np.int64), np.zeros(0, np.int64)
-    return Roads(
-        Paths(
-            np.zeros((0, 0, 6)),
-            rows,
-            none,
-            np.zeros((0, 0), np.int32),
-            np.zeros((0, 0)),
-            np.zeros((0, 0, 0, 4), np.float32),
-            np.zeros((0, 0, 0), np.float32),
-            none,
-            none.astype(bool),
-            np.zeros((0, 0)),
-            np.zeros((0, 0, 6)),
-            np.zeros((0, 0, 0), np.int32),
-        ),
-        np.zeros(0, LANE),
-        none,
-        rows,
-        rows,
-        0.0,
-        np.zeros(0),
-        rows,
-        rows,
-        none,
-        none,
-    )
 
 
 class Junction:
@@ -431,12 +400,14 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
                 expected = memory[i].ways if memory[i].age > 0 and intent == ANY else _ALL
                 for attempt in (expected, _ALL):
                     samples[i].ways = 0
-                    for lane in range(len(roads.lanes)):
-                        if lanes >> lane & 1:
-                            row = roads.straight[lane] if intent == STRAIGHT else roads.through[lane]
-                            ways = _goes_on(roads, attempt, lane)
-                            count = _add(roads, track, lane, row, i, car, v_cap, threats, count, ways)
-                            samples[i].ways |= ways
+                    left_over = lanes
+                    while left_over != 0:
+                        lane = first_of(left_over)
+                        left_over = without_first(left_over)
+                        row = roads.straight[lane] if intent == STRAIGHT else roads.through[lane]
+                        ways = _goes_on(roads, attempt, lane)
+                        count = _add(roads, track, lane, row, i, car, v_cap, threats, count, ways)
+                        samples[i].ways |= ways
                     if samples[i].ways != 0 or lanes == 0:
                         break
                     samples[i].strays = True
@@ -460,11 +431,13 @@ def _stands_out(paths, ways, i, car):
 def _fitting(roads, car, expected):
     """Lanes that a car may be driving on by its pose, of those expected if there are any; sets of bits."""
     lanes = 0
-    for among in (expected, _ANY_LANE):
+    for among in (expected, (1 << len(roads.lanes)) - 1):
         if lanes != 0:
             break
-        for lane in range(len(roads.lanes)):
-            if among >> lane & 1 and _fits(roads.lanes[lane], car, max(_BEYOND, roads.lead[lane]), _OFF, _TURNED):
+        while among != 0:
+            lane = first_of(among)
+            among = without_first(among)
+            if _fits(roads.lanes[lane], car, max(_BEYOND, roads.lead[lane]), _OFF, _TURNED):
                 lanes |= 1 << lane
     return lanes
 
@@ -502,9 +475,11 @@ def _goes_on(roads, ways, lane):
     count = len(roads.onward)
     if count > _MOST_LANES:  # more than there are bits
         return _ALL
-    onward = 0
-    for path in range(count):
-        if ways >> path & 1 and roads.onward[path, lane] >= 0:
+    onward, ways = 0, ways & (1 << count) - 1
+    while ways != 0:
+        path = first_of(ways)
+        ways = without_first(ways)
+        if roads.onward[path, lane] >= 0:
             onward |= 1 << roads.onward[path, lane]
     return onward
 

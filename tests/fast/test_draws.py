@@ -8,6 +8,7 @@ from rss_shield.envs.fast.draws import (
     GENERATOR,
     generator_state,
     integers,
+    interval,
     load_generator,
     normal,
     random,
@@ -56,3 +57,23 @@ def test_a_mix_of_draws_is_that_of_numpy(seed):
     theirs = np.array([0 if kind == 3 else draws[kind]() for kind in kinds], float)
     assert np.array_equal(ours, theirs)
     assert generator_state(generator[0]) == rng.bit_generator.state
+
+
+@njit
+def _shuffle(generators, rows):
+    for i in range(len(rows) - 1, 0, -1):
+        j = interval(generators[0], i)
+        rows[i], rows[j] = rows[j], rows[i]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 9, 17])
+def test_rows_are_shuffled_as_numpy_shuffles_them(count):
+    generator = np.zeros(1, np.dtype(GENERATOR, align=True))
+    for seed in range(50):
+        rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed)))
+        load_generator(generator[0], rng.bit_generator)
+        ours, theirs = np.arange(count), np.repeat(np.arange(count)[:, None], 2, axis=1)
+        _shuffle(generator, ours)
+        rng.shuffle(theirs)
+        assert np.array_equal(ours, theirs[:, 0])
+        assert generator_state(generator[0]) == rng.bit_generator.state

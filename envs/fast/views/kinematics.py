@@ -7,7 +7,7 @@ from highway_env.envs.common.observation import ExitObservation, KinematicObserv
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs._numpy.floats import clip, lmap, norm, wrap_to_pi
-from rss_shield.envs.fast.draws import integers
+from rss_shield.envs.fast.draws import interval
 from rss_shield.envs.fast.drivers import route_length
 from rss_shield.envs.fast.record import Unsupported
 from rss_shield.envs.fast.sight import locate
@@ -140,7 +140,7 @@ def _find_nearest(cars, episode, lanes, sight, record):
 def _shuffle(episode, rows, columns, out):
     """`Generator.shuffle` of all rows but the first."""
     for i in range(rows - 2, 0, -1):
-        j = integers(episode, i + 1)
+        j = interval(episode, i)
         for k in range(columns):
             a, b = (1 + i) * columns + k, (1 + j) * columns + k
             out[a], out[b] = out[b], out[a]

@@ -3,11 +3,9 @@
 from typing import Any
 
 import numpy as np
-from highway_env.envs.common.action import DiscreteMetaAction
 
 from rss_shield.envs._numpy.floats import clip, dot, not_zero
 from rss_shield.envs.fast.drivers import route_length
-from rss_shield.envs.fast.record import Unsupported
 from rss_shield.envs.fast.sight import locate
 from rss_shield.envs.fast.views.record import TIME_TO_COLLISION, View, empty_view
 from rss_shield.envs.roads.network import Network
@@ -17,13 +15,7 @@ _DEPTH = 3  # roads that highway-env looks ahead
 
 
 def describe(times: int, env: Any, net: Network) -> View:
-    """The view of so many moments.
-
-    Raises:
-      Unsupported: the ego has no target speeds; highway-env cannot observe then, either.
-    """
-    if type(env.action_type) is not DiscreteMetaAction:
-        raise Unsupported(f"TimeToCollision with {type(env.action_type).__name__}", "DiscreteMetaAction")
+    """The view of so many moments."""
     network = env.road.network
     view = empty_view(TIME_TO_COLLISION)
     record = view.record
