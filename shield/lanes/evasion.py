@@ -22,6 +22,7 @@ from rss_shield.shield.definitions.evasion import (
     follow,
     keeps_clear,
     must_evade,
+    naive,
     smallest_separation,
 )
 from rss_shield.shield.definitions.lateral import d_min_no_credit
@@ -136,7 +137,7 @@ def _offenders(ego, users, memory, table, who):
         braking = table.ego.a_min_brake if owes_braking(memory[i], table.rules) != 0 else 0.0
         basic = Plan(-braking, 0.0, 0.0)
         collides = smallest_separation(me, basic, other, HORIZON, STEP) < 0.0
-        enough = not collides and ends_safely(me, basic, other, table.ego, table.other, HORIZON)
+        enough = not collides and _is_over(me, basic, other, table)
         if must_evade(True, memory[i].other_broke == KEPT, collides, not enough):
             offenders |= 1 << a
             urgent = urgent or collides
@@ -171,8 +172,18 @@ def _outcome(me, plan, users, memory, offenders, table, who):
         if smallest < 0.0:
             break
         if (offenders >> a) & 1:
-            ends = ends and ends_safely(me, plan, other, table.ego, table.other, HORIZON)
+            ends = ends and _is_over(me, plan, other, table)
     return smallest, ends
+
+
+@inner
+def _is_over(me, plan, other, table):
+    """Is the danger over in the end? An ego at rest is still in the way of somebody who comes up from behind."""
+    x, v, _, _ = follow(me, plan, HORIZON)
+    x_other, v_other = naive(other.x, other.v, other.a, HORIZON)
+    if v <= 0.0 and x_other < x and v_other > 0.0:
+        return False
+    return ends_safely(me, plan, other, table.ego, table.other, HORIZON)
 
 
 @inner

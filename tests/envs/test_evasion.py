@@ -2,14 +2,17 @@
 
 import sys
 
+import numpy as np
 import pytest
 from places import ROOT
 
 sys.path.insert(0, str(ROOT / "tests" / "fast"))
 from lockstep import compare
 
+from bench.evasion import KINDS, offence
 from rss_shield import make
 from rss_shield.envs.roads.hostile import HOSTILE
+from rss_shield.eval.suite.scenarios.stage import play as stage
 from rss_shield.eval.suite.scripted import play
 
 CROWD = {"duration": 12, "vehicles_count": 8, "vehicles_density": 1.5}
@@ -31,17 +34,27 @@ def test_on_other_common_roads_too():
         assert found.close == found.episodes
 
 
-def test_it_avoids_contacts_and_is_never_to_blame():
-    avoided = at_fault = 0
-    for driver in ("squeezer", "stopper", "bounded-reverser"):
-        alone, evading = (
-            play("highway-fast-v0", "faster", {"others": driver, "evasion": on}, range(64)) for on in (False, True)
-        )
-        avoided += int(((alone["blame"] != "no contact") & (evading["blame"] == "no contact")).sum())
-        at_fault += int(evading["blame"].isin(["ego", "both", "none"]).sum())
+def test_it_is_never_to_blame_for_what_it_does():
+    contacts = 0
+    for driver in ("squeezer", "brakechecker", "bounded-reverser"):
+        evading = play("highway-fast-v0", "faster", {"others": driver, "evasion": True}, range(64))
+        assert not evading["blame"].isin(["ego", "both", "none"]).any()
         assert evading["broken_duties"].sum() == 0
-    assert at_fault == 0
-    assert avoided >= 10
+        contacts += int((evading["blame"] != "no contact").sum())
+    assert contacts > 30  # they are hostile indeed
+
+
+def test_it_avoids_what_one_driver_does_once():
+    rng, avoided, new = np.random.default_rng(5), 0, 0
+    for kind in KINDS:
+        for _ in range(3):
+            scene = offence(kind, rng)
+            alone, evading = (stage(scene, True, evasion=on) for on in (False, True))
+            avoided += bool(alone.verdict and not evading.verdict)
+            new += bool(evading.verdict and not alone.verdict)
+            assert evading.verdict in ("", "other") and evading.broken == 0
+    assert avoided >= 3
+    assert new == 0
 
 
 def test_it_is_for_common_roads_and_this_shield_only():

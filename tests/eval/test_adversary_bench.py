@@ -10,7 +10,7 @@ from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.shield.params import Rules
 from rss_shield.shield.trace import load
 
-ROW = dict(road="merge-v0", policy="idle", traffic="stock", broken=0, metres=[10.0, 8.0], seconds=[1.0, 1.0])
+ROW = dict(road="merge-v0", policy="idle", traffic="stock", broken=0)
 
 
 def test_it_is_paid_for_faults_only(tmp_path):
@@ -56,7 +56,7 @@ def test_pairs_are_counted_by_what_became_of_them():
     ]
     found = counted([ROW | {"pairs": pairs}])
     assert found == {"pairs": 100, "contacts": 9, "avoided": 6, "new": 1, "at_fault": 0}
-    page = page_of([ROW | {"pairs": pairs}])
+    page = page_of([ROW | {"pairs": pairs}], [])
     assert "| merge-v0 | 100 | 9 | 6 (67% [30%, 93%]) | 1 (1.10% [0.03%, 5.97%])" in page
     assert counted([ROW | {"pairs": [["other", "both", 2]]}])["at_fault"] == 2
 

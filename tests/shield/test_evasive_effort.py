@@ -115,3 +115,11 @@ def test_the_family_moves_over_by_one_two_and_four_metres():
     assert aside == {-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0}
     assert all(-TABLE.ego.a_max_brake <= plan.a <= TABLE.ego.a_max_accel for plan in plans)
     assert {abs(plan.a_lat) for plan in plans} == {0.0, TABLE.ego.a_lat_max_accel}  # the published table's
+
+
+def test_it_does_not_stop_in_front_of_who_comes_up_from_behind():
+    # at 30 m/s 100 m behind an ego at 20 m/s: at rest after 4 s of braking it would be touched soon after
+    follower, memory = user(-105.0, 0.0, 30.0), remembered(3, TOO_SHORT)
+    memory["ego_is_rear"] = False
+    wish = effort([(follower, memory)]).wish
+    assert wish.acceleration >= 0.0
