@@ -119,7 +119,7 @@ class EgoShields(gym.Wrapper):
         shield = shield_on(vehicle)
         if shield is None or not shield.is_ego:
             among = self.options.traffic == "compliant"
-            shield = attach(vehicle, self._settings, self.options.record, destination_of(env), among, self._judge)
+            shield = attach(vehicle, self._settings, self.options.record, destination_of(env) or "", among, self._judge)
             shield.is_ego = True
             kinds = getattr(env.action_type, "agents_action_types", [env.action_type])
             if self._settings.overrides and i < len(kinds) and keeps_speed(env, kinds[i]):
