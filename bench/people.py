@@ -39,7 +39,7 @@ ARMS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 POLICIES = ("faster", "random")
 FIRST_SEED = 900_000
-EVERY = 2  # comparisons are played on every so many seeds
+EVERY = 4  # comparisons are played on every so many seeds
 RAW, PAGE = Path("runs/people.jsonl"), Path("docs/results/people.md")
 FASTER = 2
 
@@ -144,16 +144,17 @@ Intervals are of 95 %, over episodes: Wilson's for rates."""
 
 
 def counted(frame: pd.DataFrame, arm: str) -> list[list[Any]]:
-    """One line per road and policy of an arm."""
+    """One line per road and policy of an arm, and one for all of them."""
     heading = ["road", "policy", "n", "arrived", "contacts", "with reasonable pedestrians", "with unreasonable ones"]
     table: list[list[Any]] = [[*heading, "with cars", "ego at fault", "unexplained", "mean speed [m/s]"]]
-    for (env, policy), some in frame[frame["arm"] == arm].groupby(["env", "policy"], sort=False):
+    played = frame[frame["arm"] == arm]
+    for (env, policy), some in [*played.groupby(["env", "policy"], sort=False), (("all", "all"), played)]:
         hits = some[some["blame"] != ""]
         people = hits[hits["with"] == "pedestrian"]
         fault, n = int(hits["blame"].isin(AT_FAULT).sum()), len(some)
         table.append(
             [
-                *(f"`{env}`", policy, n, f"{100 * some['success'].mean():.0f} %", len(hits)),
+                *(env, policy, n, f"{100 * some['success'].mean():.0f} %", len(hits)),
                 *(int((people["reasonable"] == True).sum()), int((people["reasonable"] == False).sum())),  # noqa: E712
                 int((hits["with"] == "car").sum()),
                 rate(fault, n),
@@ -172,12 +173,10 @@ def rate(k: int, n: int) -> str:
 def explained(frame: pd.DataFrame) -> list[list[Any]]:
     """Every contact behind the shield."""
     table: list[list[Any]] = [["road", "policy", "seed", "with", "verdict", "what it did", "ego's speed [m/s]"]]
-    hits = frame[(frame["arm"] == SHIELD) & (frame["blame"] != "")]
-    for hit in hits.itertuples():
-        named = hit._asdict()
-        who = f"pedestrian, {named['errand']}" if named["_with"] == "pedestrian" else "car"
-        duty = named["duty"] or named["own_duty"] or "-"
-        table.append([f"`{hit.env}`", hit.policy, hit.seed, who, hit.blame, duty, f"{named['impact']:.1f}"])
+    for hit in frame[(frame["arm"] == SHIELD) & (frame["blame"] != "")].to_dict("records"):
+        who = f"pedestrian, {hit['errand']}" if hit["with"] == "pedestrian" else "car"
+        what = hit["duty"] or hit["own_duty"] or "-"
+        table.append([hit["env"], hit["policy"], hit["seed"], who, hit["blame"], what, f"{hit['impact']:.1f}"])
     return table
 
 
@@ -195,7 +194,7 @@ def paired(frame: pd.DataFrame) -> list[list[Any]]:
             first, second = both["speed_other"].to_numpy(), both["speed"].to_numpy()
             d = paired_difference(first, second, np.random.default_rng(0))
             means = f"{second.mean():.2f}", f"{first.mean():.2f}"
-            table.append([f"`{env}`", arm, len(both), *means, f"{d.value:+.2f} [{d.low:+.2f}, {d.high:+.2f}]"])
+            table.append([env, arm, len(both), *means, f"{d.value:+.2f} [{d.low:+.2f}, {d.high:+.2f}]"])
     return table
 
 
@@ -229,7 +228,7 @@ def page() -> list[str]:
         "## Behind the shield",
         markdown(counted(frame, SHIELD)),
         "## Every contact behind the shield",
-        markdown(explained(frame.rename(columns={"with": "_with"}))),
+        markdown(explained(frame)),
         "## What occluders cost, and caution",
         "Always FASTER, the same seeds. *No ghosts*: the shield is not shown who may be hidden.",
         markdown(paired(frame)),
