@@ -13,6 +13,7 @@ from rss_shield.envs.highway.measured import EgoMeter
 from rss_shield.envs.highway.risk import RiskMeter
 from rss_shield.envs.highway.step import attach, shield_on
 from rss_shield.envs.options import (
+    OPEN_SPACE,
     PLANS,
     Options,
     Settings,
@@ -85,7 +86,8 @@ class EgoShields(gym.Wrapper):
         self._check()
         self._settings, self._judge = self._current_settings(), self._judge_settings()
         env: Any = self.env.unwrapped
-        if not isinstance(env, LaneKeepingEnv):  # nobody else is on its lanes, which do not meet
+        # nobody follows the lanes of a car park, and nobody else is on those of `LaneKeepingEnv`, which do not meet
+        if self._settings.scheme != OPEN_SPACE and not isinstance(env, LaneKeepingEnv):
             check_roads(env.road.network, self._settings.scheme == PLANS)
         for shield in list(egos_on(env)):
             _take_off(shield)
