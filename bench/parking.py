@@ -227,7 +227,7 @@ def row(case: Case, frame: pd.DataFrame) -> tuple[str, ...]:
 
 def _count(k: int, n: int) -> str:
     """A number of episodes, and where the interval of its rate ends."""
-    return f"{k} (< {100 * wilson(k, n).high:.2g} %)"
+    return f"{k} (< {100 * wilson(k, n).high:.{2 if k < n else 3}g} %)"
 
 
 def _percent(rate: Interval) -> str:
@@ -318,7 +318,8 @@ Cars are driven at random, at full throttle (forward or back) with random steeri
 Each agent's car has a shield of its own; without a shield it is watched and judged all the same. Contacts are counted
 in episodes, verdicts for each agent's car, from its own view: a contact of two agents has two. *At fault* are verdicts
 "ego" and "both", *empty* those that charge nobody though somebody must have broken a duty. *Broken*: pair-frames in
-danger on which the car broke its duty. *All parked*: every car is in its place in the end; *after*: how long that took.
+danger on which the car broke its duty. *Episodes*: those played so far, of 300, 100 or 60; the command goes on with
+the rest. *All parked*: every car is in its place in the end; *after*: how long that took.
 
 Rates are of episodes, with 95 % Wilson intervals or their upper ends; shares of cars parked with 95 % bootstrap
 intervals over episodes."""

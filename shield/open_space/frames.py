@@ -55,7 +55,7 @@ WHEELS = np.pi / 4  # largest steering angle of highway-env's cars [rad]
 _TAN = 0.5 * np.tan(WHEELS)  # of the slip that it makes
 MAX_SLIP = np.arctan(_TAN)
 _SIN, _COS = np.sin(MAX_SLIP), np.cos(MAX_SLIP)
-_AHEAD = 0.5  # share of the ways of two in a frame by which a test of contact that looks a frame ahead errs
+LOOK_AHEAD = 0.5  # share of the ways of two in a frame by which a test of contact that looks a frame ahead errs
 
 
 class Space(NamedTuple):
@@ -128,12 +128,12 @@ def _fill(mover, kind, driver, dt, rows, response):
     """Fill the rows of one that brakes after `response` frames.
 
     Returns:
-      Frames until all stand, how far the farthest gets by then, and the nearest [m].
+      Frames until all stand, how far the farthest gets by then, widened, and how far the nearest [m].
     """
     fast, slow = mover.v, mover.v
     wheel = np.abs(mover.offset) / _SIN if kind == CAR else 1.0  # radius on which the centre turns
-    wider = _AHEAD + 2.0 * np.sin(0.5 * MAX_SLIP) if kind == CAR else _AHEAD
-    way, least, steps = 0.0, 0.0, len(rows) + 1
+    wider = LOOK_AHEAD + 2.0 * np.sin(0.5 * MAX_SLIP) if kind == CAR else LOOK_AHEAD
+    way, widest, least, steps = 0.0, 0.0, 0.0, len(rows) + 1
     if kind == FIXED:
         fast = slow = 0.0
         response = steps = 0
@@ -158,10 +158,11 @@ def _fill(mover, kind, driver, dt, rows, response):
             row[COS_RIGHT] = row[COS_LEFT] = np.cos(turn)
             row[SIN_RIGHT] = row[SIN_LEFT] = np.sin(turn)
         row[ANEW], row[WIDER] = 0.0, wider * hi
+        widest = max(widest, wider * hi)
         if k < response:
             fast, slow = fastest(fast, driver, dt), slowest(slow, driver, dt)
         else:
             fast = max(fast - driver.a_min_brake * dt, 0.0)
             hard, weak = slow - driver.a_max_brake * dt, slow + driver.a_min_brake * dt
             slow = max(hard, 0.0) if slow > 0.0 else min(weak, 0.0)
-    return steps, way, max(least, 0.0)
+    return steps, way + widest, max(least, 0.0)

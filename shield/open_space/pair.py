@@ -19,7 +19,10 @@ from rss_shield.shield.definitions.unstructured import (
     BOTH_BRAKE,
     DANGEROUS,
     FIRST_BRAKES,
+    HI,
+    LO,
     SECOND_BRAKES,
+    WIDER,
     angle_away,
     steps_apart,
     turn_to_drive_away,
@@ -60,14 +63,12 @@ def clear(one, rows_1, two, rows_2, steps, eps):
     if steps > len(rows_1):
         return False  # nobody has looked far enough ahead
     first, second = one.mover, two.mover
-    distance, reach = np.hypot(second.x - first.x, second.y - first.y), 0.0
+    reach, wider = one.bounds.diagonal + two.bounds.diagonal + eps, 0.0
     for k in range(steps):
-        reach += max(np.abs(rows_1[k, 0]), np.abs(rows_1[k, 1])) + max(np.abs(rows_2[k, 0]), np.abs(rows_2[k, 1]))
-    widest = 0.0
-    for k in range(steps):
-        widest = max(widest, rows_1[k, 9] + rows_2[k, 9])
-    if distance > reach + widest + one.bounds.diagonal + two.bounds.diagonal + eps:
-        return True
+        reach += max(np.abs(rows_1[k, LO]), np.abs(rows_1[k, HI])) + max(np.abs(rows_2[k, LO]), np.abs(rows_2[k, HI]))
+        wider = max(wider, rows_1[k, WIDER] + rows_2[k, WIDER])
+    if np.hypot(second.x - first.x, second.y - first.y) > reach + wider:
+        return True  # their discs do not meet
     return steps_apart(one, rows_1, two, rows_2, steps, eps) == (np.int64(1) << np.int64(steps)) - np.int64(1)
 
 

@@ -21,7 +21,7 @@ from rss_shield.shield.definitions.unstructured import (
     Occupancy,
     bounds_of,
 )
-from rss_shield.shield.open_space.frames import _AHEAD, mover_of
+from rss_shield.shield.open_space.frames import LOOK_AHEAD, mover_of
 
 
 @part
@@ -43,7 +43,7 @@ def intention(user, acceleration, slip, b, dt, rows):
     gear = -1.0 if user.speed < 0.0 else 1.0
     v, angle, lag = user.speed, 0.0, user.half_length
     sin, cos = np.sin(slip), np.cos(slip)
-    wider = _AHEAD + 2.0 * np.sin(0.5 * np.abs(slip))
+    wider = LOOK_AHEAD + 2.0 * np.sin(0.5 * np.abs(slip))
     reach, steps = 0.0, len(rows) + 1
     for k in range(len(rows)):
         row = rows[k]
