@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import numpy as np
 import tyro
-from head_to_head import library, measure, table
+from head_to_head import library, measure, table, with_rows_of
 
 import rss_shield
 from rss_shield.eval.pages import fill
@@ -131,7 +131,8 @@ def beside(config: Config) -> None:
     text = table(rows, "EnvPool", other.__version__)
     print(text)
     if config.write:
-        fill(PAGE, config.against, text)
+        block = PAGE.read_text(encoding="utf-8").split(f"<!-- {config.against} -->")[1].split("<!--")[0]
+        fill(PAGE, config.against, with_rows_of(block, text))
 
 
 def main(config: Config) -> None:

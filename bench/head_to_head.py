@@ -169,6 +169,14 @@ def table(rows: list[Row], name: str, version: str) -> str:
     return markdown(lines)
 
 
+def with_rows_of(before: str, table: str) -> str:
+    """A table, and below it those rows of an earlier one that it does not measure again."""
+    lines = table.splitlines()
+    measured = {line.split("|")[1] for line in lines}
+    kept = [line for line in before.splitlines() if line.startswith("| `") and line.split("|")[1] not in measured]
+    return "\n".join(lines + kept)
+
+
 def _interval(count: int) -> str:
     interval = clopper_pearson(count, EPISODES)
     return f"{100 * interval.low:.0f} to {100 * interval.high:.0f} %"

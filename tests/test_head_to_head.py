@@ -1,6 +1,6 @@
 """The table beside another library says what was measured."""
 
-from bench.head_to_head import EPISODES, Row, library, table
+from bench.head_to_head import EPISODES, Row, library, table, with_rows_of
 
 
 def test_a_row_has_medians_ratios_and_counts():
@@ -14,6 +14,11 @@ def test_a_row_has_medians_ratios_and_counts():
     assert cells[4] == "engine 4, Other 1"
     # 10 of 10: from (0.05 / 2) ** (1 / 10) = 69 % on (Clopper and Pearson); none: up to 31 %
     assert cells[5] == "engine 10 of 10 (69 to 100 %); Other 0 of 10 (0 to 31 %)"
+
+
+def test_rows_of_other_environments_stay():
+    before = "| x |\n| --- |\n| `a` | old |\n| `b` | old |\n"
+    assert with_rows_of(before, "| x |\n| --- |\n| `b` | new |") == "| x |\n| --- |\n| `b` | new |\n| `a` | old |"
 
 
 def test_a_library_that_is_not_there_is_skipped_by_name(capsys):
