@@ -122,7 +122,7 @@ def row(name: str, results: list[dict[str, Any]]) -> list[str]:
     )
     return [
         *(name, spaced(found["pairs"]), spaced(found["contacts"]), avoided),
-        f"{found['new']} ({new.value:.2%} [{new.low:.2%}, {new.high:.2%}])",
+        f"{found['new']} ({new.value:.2%} [{new.low:.2%}, {new.high:.2%}])" if new.n else "-",
         f"{found['at_fault']} (95 % below {at_fault.high:.1e})",
     ]
 
