@@ -139,8 +139,11 @@ def reasons(row: supported.Row) -> dict[str, list[str]]:
     for name, reason in row.shield.items():
         if reason:
             found.setdefault(reason, []).append(name)
-    for name, reason in (*row.engine.items(), *row.observations.items()):
-        if reason and name != supported.DEFAULT:
+    tried = {name: reason for name, reason in (row.engine | row.observations).items() if name != supported.DEFAULT}
+    if all(tried.values()) and len({*tried.values()}) == 1:
+        tried = {"the engine": next(iter(tried.values()))}
+    for name, reason in tried.items():
+        if reason:
             found.setdefault(reason, []).append(name)
     return found
 

@@ -1,8 +1,8 @@
 """What works on every environment of highway-env, found out by trying: behind the shield there, and in the engine."""
 
+import re
 import warnings
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any, NamedTuple
 
 import gymnasium as gym
@@ -54,9 +54,9 @@ def probe(env_id: str) -> Row:
         seen = {name: {"observation": config} for name, config in OBSERVATIONS.items()}
         return Row(
             env_id,
-            {name: _tried(partial(_step, env_id, config)) for name, config in configs.items()},
-            {name: _tried(partial(_build, env_id, config)) for name, config in configs.items()},
-            {name: _tried(partial(_build, env_id, config)) for name, config in seen.items()},
+            {name: _tried(_step, env_id, config) for name, config in configs.items()},
+            {name: _tried(_build, env_id, config) for name, config in configs.items()},
+            {name: _tried(_build, env_id, config) for name, config in seen.items()},
         )
 
 
@@ -72,6 +72,7 @@ def _configs(env_id: str) -> dict[str, Mapping[str, Any] | None]:
         kept = agent if agent["type"] == action["type"] == "DiscreteMetaAction" else {}  # its target speeds
         one[name] = {"action": {**kept, **action}} | ({} if name == "meta-actions" else changes)
         one[name] |= {"simulation_frequency": HERTZ} if name == SLIPPING else {}
+        one[name] |= {"controlled_vehicles": 1} if default.get("controlled_vehicles", 1) > 1 else {}
     several = {
         "controlled_vehicles": 2,
         "action": {"type": "MultiAgentAction", "action_config": dict(agent)},
@@ -101,12 +102,19 @@ def _build(env_id: str, config: Mapping[str, Any] | None) -> None:
     make_vec(env_id, 1, config=None if config is None else dict(config)).close()
 
 
-def _tried(what: Callable[[], None]) -> str:
+def _tried(what: Callable[..., None], env_id: str, config: Mapping[str, Any] | None) -> str:
     try:
-        what()
+        what(env_id, config)
     except Exception as error:  # whatever the reason, it is told
-        return _said(error)
+        return shortened(_said(error), env_id)
     return ""
+
+
+def shortened(reason: str, env_id: str) -> str:
+    """A reason without what the row says anyhow."""
+    if reason.startswith("the fast engine does not support env_id"):
+        return "the engine does not have it"
+    return re.sub(r"config = \{.*\}", "config", reason).replace(f" in {env_id}", "")
 
 
 def _said(error: Exception) -> str:
@@ -118,4 +126,4 @@ def refused(env_id: str, config: Mapping[str, Any] | None = None) -> str:
     """Why an environment cannot be driven behind the shield on highway-env, "" if it can."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return _tried(partial(_step, env_id, config or None))
+        return _tried(_step, env_id, config or None)
