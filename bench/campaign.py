@@ -61,9 +61,9 @@ PARTS = (
 TELLING = ("change-penalty-0.02", "change-penalty-0.1", "penalty-0.5", "reward-shaping", "sailr", "proactive")
 SHORT = (
     Part("short-highway-main", HIGHWAY, MAIN, 200_000, 5),
-    Part("short-highway-scripted", HIGHWAY, SCRIPTED, 1, 1),
+    Part("short-highway-scripted", HIGHWAY, SCRIPTED, 1, 1, 200),
     Part("short-intersection-main", INTERSECTION, MAIN, 100_000, 3),
-    Part("short-intersection-scripted", INTERSECTION, SCRIPTED, 1, 1),
+    Part("short-intersection-scripted", INTERSECTION, SCRIPTED, 1, 1, 200),
     Part("short-highway-others", HIGHWAY, (*TELLING, "distance-45m", "literal-def10"), 200_000, 3),
     Part("short-highway-off-policy", HIGHWAY, (*Q_LEARNERS, *CONTINUOUS), 50_000, 3),
 )
