@@ -23,6 +23,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from rss_shield import make, make_vec
 from rss_shield.envs import supported
+from rss_shield.envs.stock import make_stock
 from rss_shield.eval.files import atomic
 from rss_shield.eval.pages import markdown, spaced, write_page
 from rss_shield.eval.progress import progress_bar
@@ -230,7 +231,8 @@ def in_engine(case: Case, policy: str, mode: str, count: int) -> pd.DataFrame:
         return make_vec(case.env_id, n, mode, config=dict(case.config), autoreset_mode=AutoresetMode.DISABLED)
 
     one: Any = make_batch(1)
-    actions, faster = one.single_action_space.n, one.scenario.env.action_type.actions_indexes["FASTER"]
+    stock: Any = make_stock(case.env_id, config=dict(case.config)).unwrapped
+    actions, faster = one.single_action_space.n, stock.action_type.actions_indexes["FASTER"]
     frame = evaluate(
         make_batch,
         lambda seen: rng.integers(actions, size=len(seen)) if policy == "random" else np.full(len(seen), faster),
