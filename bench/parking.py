@@ -213,7 +213,7 @@ def row(case: Case, frame: pd.DataFrame) -> tuple[str, ...]:
         case.policy,
         "yes" if case.shielded else "no",
         str(n),
-        str(int(episodes.crashed.any().sum())),
+        str(frame.seed[frame.crashed | (frame.blame != "")].nunique()),  # some are only predicted, at the very end
         ", ".join(f"{verdicts[name]} {name}" for name in BLAMES if verdicts[name]) or "none",
         _count(at_fault, n),
         _count(empty, n),
