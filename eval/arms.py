@@ -23,6 +23,7 @@ WANTED_CHANGE: Mapping[str, Any] = {"penalty_on": "change", FROM_OPTIONS: {"targ
 WANTED_SHARE: Mapping[str, Any] = {"penalty_on": "response", FROM_OPTIONS: {"target": "target_share"}}
 WANTED_COST: Mapping[str, Any] = {FROM_OPTIONS: {"cost_limit": "cost_limit"}}
 CONTINUOUS: Mapping[str, Any] = {"action": {"type": "ContinuousAction"}}
+SEMANTIC: Mapping[str, Any] = {"semantic_actions": {"features": True}}
 
 
 class Arm(NamedTuple):
@@ -39,6 +40,7 @@ class Arm(NamedTuple):
     train: str = ""  # how tables call the arm; "": its name
     masked: bool = False  # it chooses among permitted actions, where a shield is on
     backend: str = ""  # the only one that can play it
+    chooses: Mapping[str, Any] = {}  # options of `rss_shield.make` that say among what; none: as the environment has it
 
     @property
     def scripted(self) -> bool:
@@ -121,6 +123,30 @@ ROWS = (
     Arm("sac", "SAC without a shield", "#CC6677", "sac", config=CONTINUOUS),
     Arm("sac-replaced", "SAC, commands replaced", "#44AA99", "sac", IN_FULL, tests=own(IN_FULL), config=CONTINUOUS),
     Arm("sac-projected", "SAC, commands corrected as little as may be", "#999933", "sac", SHIELDED, config=CONTINUOUS),
+    Arm(
+        "semantic-planner",
+        "the best semantic action by value",
+        "#DDAA33",
+        SCRIPTED,
+        settings={"driver": "semantic"},
+        chooses=SEMANTIC,
+    ),
+    Arm(
+        "semantic-random",
+        "random semantic actions",
+        "#777711",
+        SCRIPTED,
+        settings={"driver": "any semantic"},
+        chooses=SEMANTIC,
+    ),
+    Arm(
+        "semantic-dqn",
+        "DQN on semantic actions behind the shield",
+        "#BB5566",
+        "semantic-dqn",
+        SHIELDED,
+        chooses=SEMANTIC,
+    ),
     rival("ttc", "a limit of the time to collision", "#661100"),
     rival("distance-45m", "a distance of 45 m", "#6699CC"),
     rival("cbf", "a control barrier function", "#888888"),
