@@ -123,6 +123,11 @@ ROWS = (
     Arm("sac", "SAC without a shield", "#CC6677", "sac", config=CONTINUOUS),
     Arm("sac-replaced", "SAC, commands replaced", "#44AA99", "sac", IN_FULL, tests=own(IN_FULL), config=CONTINUOUS),
     Arm("sac-projected", "SAC, commands corrected as little as may be", "#999933", "sac", SHIELDED, config=CONTINUOUS),
+    rival("ttc", "a limit of the time to collision", "#661100"),
+    rival("distance-45m", "a distance of 45 m", "#6699CC"),
+    rival("cbf", "a control barrier function", "#888888"),
+    rival("limits", "the always-on limits alone", "#AA4466"),
+    rival("literal-def10", "Def. 10 as printed, once per decision", "#4477AA"),
     Arm(
         "semantic-planner",
         "the best semantic action by value",
@@ -147,11 +152,6 @@ ROWS = (
         SHIELDED,
         chooses=SEMANTIC,
     ),
-    rival("ttc", "a limit of the time to collision", "#661100"),
-    rival("distance-45m", "a distance of 45 m", "#6699CC"),
-    rival("cbf", "a control barrier function", "#888888"),
-    rival("limits", "the always-on limits alone", "#AA4466"),
-    rival("literal-def10", "Def. 10 as printed, once per decision", "#4477AA"),
 )
 ARMS = {arm.name: arm for arm in ROWS}
 
