@@ -9,9 +9,9 @@ another optimizer's).
 import sys
 
 from stable_baselines3 import DQN, PPO
-from stable_baselines3.common.env_util import make_vec_env
 
-from rss_shield import make
+from rss_shield import make_vec
+from rss_shield.agents.vec_env import VectorEnvAdapter
 
 DECISIONS = int(sys.argv[1]) if sys.argv[1:] and sys.argv[1].isdigit() else 384
 SEEN = {"type": "Kinematics", "vehicles_count": 10, "absolute": False}
@@ -32,7 +32,7 @@ SETTINGS = {  # name -> environment, its configuration, how many, algorithm, its
     "rl-agents DQN": ("intersection-v0", {}, 1, DQN, {**NARROW, "gamma": 0.95, **REPLAY, **EXPLORATION}),
 }
 for name, (env_id, config, count, algorithm, settings) in SETTINGS.items():
-    env = make_vec_env(make, count, seed=0, env_kwargs={"env_id": env_id, "config": config})  # theirs: gym.make
+    env = VectorEnvAdapter(make_vec(env_id, count, config=config))  # theirs: gymnasium.make, or make_vec_env
     model = algorithm("MlpPolicy", env, seed=0, **settings).learn(DECISIONS)
     ended = [episode["r"] for episode in model.ep_info_buffer]
     mean = f"mean return {sum(ended) / len(ended):.1f}" if ended else "none ended"

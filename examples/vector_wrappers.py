@@ -1,4 +1,7 @@
-"""gymnasium's vector wrappers around the engine, and its own `make_vec` style of training loop.
+"""gymnasium's vector wrappers around the engine.
+
+Wrappers that look at single observations want each episode to begin in a step of its own. Episodes are counted already:
+`infos["episode"]` is there, and `RecordEpisodeStatistics` needs another key beside it.
 
 python examples/vector_wrappers.py
 """
@@ -9,17 +12,19 @@ from gymnasium.wrappers.vector import FlattenObservation, NormalizeObservation, 
 
 from rss_shield import make_vec
 
-# wrappers that look at single observations want each episode to begin in a step of its own
-envs = make_vec("highway-fast-v0", 32, autoreset_mode=AutoresetMode.NEXT_STEP)
-for wrap in (RecordEpisodeStatistics, FlattenObservation, NormalizeObservation, NormalizeReward):
-    envs = wrap(envs)
+envs = RecordEpisodeStatistics(
+    make_vec("highway-fast-v0", 32, autoreset_mode=AutoresetMode.NEXT_STEP), stats_key="counted"
+)
+envs = NormalizeReward(NormalizeObservation(FlattenObservation(envs)))
 
 rng, cost, returns = np.random.default_rng(0), 0.0, []
-observations, _ = envs.reset(seed=0)
+envs.reset(seed=0)
 for _ in range(64):
     observations, rewards, terminated, truncated, infos = envs.step(rng.integers(5, size=32))
     cost += float(infos["cost"].sum())
-    returns += infos["episode"]["r"][infos["_episode"]].tolist() if "episode" in infos else []
+    if (ended := terminated | truncated).any():
+        returns += infos["episode"]["r"][ended].tolist()
+        assert np.allclose(infos["counted"]["r"][ended], infos["episode"]["r"][ended])
 print(
     f"observations {observations.shape}, {len(returns)} episodes, mean return {np.mean(returns):.1f}, cost {cost:.0f}"
 )

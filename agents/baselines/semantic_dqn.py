@@ -36,14 +36,15 @@ class RowNetwork(QNetwork):
 
     def __init__(self, observation_space: spaces.Box, action_space: spaces.Discrete, *others: Any, **more: Any) -> None:
         super().__init__(observation_space, action_space, *others, **more)
+        self.table = observation_space.shape  # of rows
         layers: list[nn.Module] = []
         width = observation_space.shape[1]
         for wide in self.net_arch:
             layers, width = [*layers, nn.Linear(width, wide), self.activation_fn()], wide
         self.q_net = nn.Sequential(*layers, nn.Linear(width, 1))
 
-    def forward(self, obs: torch.Tensor) -> torch.Tensor:
-        rows = obs.reshape(len(obs), *self.observation_space.shape)
+    def forward(self, obs: Any) -> torch.Tensor:
+        rows = obs.reshape(len(obs), *self.table)
         return torch.where(rows[..., 0] > 0.0, self.q_net(rows).squeeze(-1), MISSING)
 
 
