@@ -48,16 +48,12 @@ class SemanticActions(gym.Wrapper, RecordConstructorArgs):
         if has_agents(stock):
             raise ValueError("semantic_actions with several agents: expected one")
         check_unreplaced(getattr(env, "options", None))
-        self.space = SemanticSpace(stock, asked)
-        self.action_space = self.space.single_action_space
-        if asked.features:
-            self.observation_space = self.space.feature_space
-        self.outlook = self._look()
+        self._begin()
 
     def reset(self, *, seed=None, options=None):
         observation, info = self.env.reset(seed=seed, options=options)
         if (options or {}).get("config"):
-            self.space = SemanticSpace(self.env.unwrapped, self.settings)
+            self._begin()
         self.outlook = self._look()
         return self._seen(observation), info
 
@@ -75,6 +71,14 @@ class SemanticActions(gym.Wrapper, RecordConstructorArgs):
     def action_masks(self) -> np.ndarray:
         """Which semantic actions there are now, `[A]` bool: whom one is about must be in the lane that it is about."""
         return self.outlook.valid
+
+    def _begin(self) -> None:
+        """Of the environment as it is configured now."""
+        self.space = SemanticSpace(self.env.unwrapped, self.settings)
+        self.action_space = self.space.single_action_space
+        if self.settings.features:
+            self.observation_space = self.space.feature_space
+        self.outlook = self._look()
 
     def _seen(self, observation: Any) -> Any:
         return self.outlook.features if self.settings.features else observation

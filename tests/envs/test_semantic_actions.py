@@ -315,6 +315,9 @@ def test_the_space_is_linear_in_neighbours_and_lanes():
     assert env.action_space.n == 9 * 6 and env.observation_space.shape == (54, len(FEATURES))
     with pytest.raises(ValueError, match="expected a whole number from 0 to 53"):
         env.step(54)
+    env = make(HIGHWAY, None, semantic_actions=True)
+    env.reset(seed=0, options={"config": {"lanes_count": 2}})
+    assert env.action_space.n == 2 * 7 * 6
     assert straight_path(make(HIGHWAY, None).unwrapped.road.network.graph["0"]["1"]).lanes.tolist() == [0, 4, 8]
 
 
