@@ -1,6 +1,6 @@
 """TorchRL: the environment in a GymWrapper, `info["cost"]` as a key of its tensors for constrained learners.
 
-python examples/torchrl_cost.py            (pip install torchrl)
+python examples/torchrl_cost.py            (pip install 'rss-shield[torchrl]')
 """
 
 import numpy as np
