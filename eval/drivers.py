@@ -17,13 +17,19 @@ def uniform(actions: int, rng: np.random.Generator) -> Driver:
     return lambda observations: rng.integers(actions, size=len(observations))
 
 
-# rows of semantic features begin with these two, see `envs.semantic.outlook`
-_VALID, _VALUE = 0, 1
+# columns of semantic features, see `envs.semantic.outlook`
+_VALID, _VALUE, _MEAN_SPEED = 0, 1, 4
+_PROGRESS = 1e-3  # what decides between equal values
 
 
 def best_value() -> Driver:
-    """The semantic action that promises most, of features `[E, A, D]`; the first of several."""
-    return lambda rows: np.where(rows[..., _VALID] > 0.0, rows[..., _VALUE], -np.inf).argmax(axis=1)
+    """The semantic action that promises most, of features `[E, A, D]`; of several, the one that gets farthest."""
+
+    def choose(rows: np.ndarray) -> np.ndarray:
+        promised = rows[..., _VALUE] + _PROGRESS * rows[..., _MEAN_SPEED]
+        return np.where(rows[..., _VALID] > 0.0, promised, -np.inf).argmax(axis=1)
+
+    return choose
 
 
 def any_valid(rng: np.random.Generator) -> Driver:

@@ -10,6 +10,7 @@ from highway_env.envs.intersection_env import IntersectionEnv
 
 from rss_shield.envs.semantic.outlook import (
     FEATURES,
+    MEAN_SPEED,
     NEAR_FIELDS,
     PLAN_FIELDS,
     VALID,
@@ -36,6 +37,7 @@ from rss_shield.shield.definitions.semantics import (
 SUPPORTED = "highway-v0, highway-fast-v0, intersection-v0/-v2"
 _LOOKS = 0.4  # from one look for contacts to the next [s]
 _MOST_CARS = 512
+_PROGRESS = 1e-3  # what decides between equal values
 
 
 class Outlook(NamedTuple):
@@ -56,8 +58,9 @@ class Outlook(NamedTuple):
 
     @property
     def best(self) -> int:
-        """The valid action that promises most."""
-        return int(np.where(self.valid, self.value, -np.inf).argmax())
+        """The valid action that promises most; of several, the one that gets farthest."""
+        promised = self.value + _PROGRESS * self.features[:, MEAN_SPEED]
+        return int(np.where(self.valid, promised, -np.inf).argmax())
 
 
 class SemanticSpace:

@@ -73,6 +73,8 @@ def test_drivers_take_the_best_value_and_any_that_is_valid():
     rows[0, :, 0], rows[0, :, 1] = [1, 1, 0], [0.2, 0.5, 9.0]
     rows[1, :, 0], rows[1, :, 1] = [1, 0, 1], [-0.5, 3.0, -0.5]
     assert best_value()(rows).tolist() == [1, 0]
+    rows[1, :, 4] = [0.3, 0.9, 0.4]  # the same value, and farther
+    assert best_value()(rows).tolist() == [1, 2]
     draw = any_valid(np.random.default_rng(0))
     drawn = np.array([draw(rows) for _ in range(400)])
     assert set(drawn[:, 0]) == {0, 1} and set(drawn[:, 1]) == {0, 2}
