@@ -31,15 +31,16 @@ from rss_shield.shield.verdicts import AT_FAULT
 PAGE = Path("docs/results/semantic.md")
 RAW = ("random", "lazy", "slower", "dqn-shielded")
 ON_SEMANTIC = ("semantic-random", "semantic-planner", "semantic-dqn")
+LEARNERS = "Learners: {timesteps} decisions behind the shield, seeds {seeds}, tested on {episodes} episodes each. "
 HEADING = [
     *("driver", "shield", "n", "return", "success", "the ego's fault", "frames overridden", "change m/s²", "speed m/s"),
 ]
 ABOUT = """\
-Written by `python bench/semantic.py --write`. Learners: {timesteps} decisions behind the shield, seeds {seeds},
-tested on {episodes} episodes each; drivers that learn nothing on as many. The same test seeds for all. Intervals:
-95 %; returns of learners over seeds and episodes, all other over episodes. Success: no contact on the motorway,
-arrived without contact at the intersection. *Frames overridden*: by a proper response; *change*: what the shield
-changed an acceleration by, anticipation included. How they work: [semantic actions](../semantic.md)."""
+Written by `python bench/semantic.py --write`. {learners}Drivers that learn nothing: {episodes} episodes. The same test
+seeds for all. Intervals: 95 %; returns of learners over seeds and episodes, all other over episodes. Success: no
+contact on the motorway, arrived without contact at the intersection. *Frames overridden*: by a proper response;
+*change*: what the shield changed an acceleration by, anticipation included. How they work: [semantic
+actions](../semantic.md)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,6 +48,7 @@ class Config:
     """Compare semantic actions with meta-actions."""
 
     envs: tuple[str, ...] = ("highway-fast-v0", "intersection-v0")
+    arms: tuple[str, ...] = (*RAW, *ON_SEMANTIC)  # who drives
     timesteps: int = 20_000  # decisions per training
     seeds: tuple[int, ...] = (0, 1, 2)
     episodes: int = 300  # per test of a model, or of a driver that learns nothing
@@ -62,7 +64,7 @@ def run(env_id: str, config: Config) -> Path:
     numbers = {"--total-timesteps": config.timesteps, "--eval-episodes": config.episodes, "--n-envs": config.n_envs}
     fixed = ["--replay-episodes", "0", "--removal-checks", "0", "--workers", "1"]
     fixed += [] if (config.out / env_id / "config.json").exists() else ["--no-pages"]  # which a run remembers
-    words = ["--env-id", env_id, "--arms", *RAW, *ON_SEMANTIC, "--seeds", *map(str, config.seeds)]
+    words = ["--env-id", env_id, "--arms", *config.arms, "--seeds", *map(str, config.seeds)]
     words += [word for name, value in numbers.items() for word in (name, str(value))]
     train.main([*words, *fixed, "--runs-dir", str(config.out), "--name", env_id, "--resume"])
     return config.out / env_id
@@ -71,7 +73,7 @@ def run(env_id: str, config: Config) -> Path:
 def rows_of(folder: Path, config: Config) -> list[list[str]]:
     """A row per arm and test."""
     rows = []
-    for name in (*RAW, *ON_SEMANTIC):
+    for name in config.arms:
         arm = ARMS[name]
         seeds = config.seeds[:1] if arm.scripted else config.seeds
         for test in arm.tests:
@@ -138,11 +140,9 @@ def speeds(env_id: str, config: Config) -> list[list[str]]:
 
 def main(config: Config) -> None:
     folders = {env_id: run(env_id, config) for env_id in config.envs}
-    seeds = ", ".join(map(str, config.seeds))
-    parts = [
-        "# Semantic actions beside meta-actions",
-        ABOUT.format(timesteps=config.timesteps, seeds=seeds, episodes=config.episodes),
-    ]
+    told = {"timesteps": config.timesteps, "seeds": ", ".join(map(str, config.seeds)), "episodes": config.episodes}
+    learners = "" if all(ARMS[name].scripted for name in config.arms) else LEARNERS.format(**told)
+    parts = ["# Semantic actions beside meta-actions", ABOUT.format(learners=learners, episodes=config.episodes)]
     for env_id, folder in folders.items():
         parts += [f"## {env_id}", markdown([HEADING, *rows_of(folder, config)])]
     timed = [line for env_id in config.envs for line in speeds(env_id, config)]

@@ -8,11 +8,13 @@ another optimizer's).
 
 import sys
 
+import torch
 from stable_baselines3 import DQN, PPO
 
 from rss_shield import make_vec
 from rss_shield.agents.vec_env import VectorEnvAdapter
 
+torch.set_num_threads(1)
 DECISIONS = int(sys.argv[1]) if sys.argv[1:] and sys.argv[1].isdigit() else 384
 SEEN = {"type": "Kinematics", "vehicles_count": 10, "absolute": False}
 SEEN["features"] = ["presence", "x", "y", "vx", "vy", "cos_h", "sin_h"]
