@@ -38,6 +38,7 @@ class SemanticVectorEnv(VectorEnv):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.metadata = env.metadata | {"autoreset_mode": autoreset_mode}
+        self.render_mode = env.render_mode
         self._lanes = list(stock.road.network.lanes_dict())
         ways = [(origin, end) for origin, ends in stock.road.network.graph.items() for end in ends]
         routes = env.scenario.network.route_roads
@@ -82,6 +83,10 @@ class SemanticVectorEnv(VectorEnv):
     def action_masks(self) -> np.ndarray:
         """Which semantic actions there are now, `[E, A]` bool; see `SemanticActions.action_masks`."""
         return np.stack([outlook.valid for outlook in self.outlooks])
+
+    def render(self) -> Any:
+        """Pictures of all environments, see `FastVectorEnv.render`."""
+        return self.env.render()
 
     def info(self, e: int) -> dict:
         """The last infos of one environment as a plain dictionary, without what is semantic."""

@@ -51,7 +51,7 @@ def steering_within(lane, s, lateral, heading, speed, length, drift):
     across = clip(-_KP_LATERAL * lateral, -drift, drift)
     course = arcsin(clip(across / not_zero(speed), -1.0, 1.0))
     slip = arcsin(_sine_of_slip(lane, s, heading, speed, length, course))
-    return clip(steering_for(slip), -_MAX_STEERING, _MAX_STEERING)
+    return clip(steering_for(slip), -MAX_STEERING, MAX_STEERING)
 
 
 @inner
