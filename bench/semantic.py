@@ -36,7 +36,7 @@ HEADING = [
     *("driver", "shield", "n", "return", "success", "the ego's fault", "frames overridden", "change m/s²", "speed m/s"),
 ]
 ABOUT = """\
-Written by `python bench/semantic.py --write`. {learners}Drivers that learn nothing: {episodes} episodes. The same test
+Written by `{command}`. {learners}Drivers that learn nothing: {episodes} episodes. The same test
 seeds for all. Intervals: 95 %; returns of learners over seeds and episodes, all other over episodes. Success: no
 contact on the motorway, arrived without contact at the intersection. *Frames overridden*: by a proper response;
 *change*: what the shield changed an acceleration by, anticipation included. How they work: [semantic
@@ -138,11 +138,22 @@ def speeds(env_id: str, config: Config) -> list[list[str]]:
     return [[env_id, name, f"{speed(env_id, *how, config):,.0f}".replace(",", " ")] for name, *how in measured]
 
 
+def command_of(config: Config) -> str:
+    """The command line that measures the same."""
+    words, default = ["python bench/semantic.py --write"], Config()
+    for name in ("envs", "arms", "timesteps", "seeds", "episodes", "n_envs", "side_by_side", "decisions"):
+        value = getattr(config, name)
+        if value != getattr(default, name):
+            words += [f"--{name.replace('_', '-')}", *map(str, value if isinstance(value, tuple) else [value])]
+    return " ".join(words)
+
+
 def main(config: Config) -> None:
     folders = {env_id: run(env_id, config) for env_id in config.envs}
     told = {"timesteps": config.timesteps, "seeds": ", ".join(map(str, config.seeds)), "episodes": config.episodes}
     learners = "" if all(ARMS[name].scripted for name in config.arms) else LEARNERS.format(**told)
-    parts = ["# Semantic actions beside meta-actions", ABOUT.format(learners=learners, episodes=config.episodes)]
+    about = ABOUT.format(command=command_of(config), learners=learners, episodes=config.episodes)
+    parts = ["# Semantic actions beside meta-actions", about]
     for env_id, folder in folders.items():
         parts += [f"## {env_id}", markdown([HEADING, *rows_of(folder, config)])]
     timed = [line for env_id in config.envs for line in speeds(env_id, config)]
