@@ -241,8 +241,8 @@ def cells_of(config: Config, arm: Arm, seed: int) -> list[tuple[str, int, str]]:
 
 
 def in_engine(arm: Arm) -> bool:
-    """Can its episodes be played by numbered actions in the engine?"""
-    return not arm.backend and not arm.continuous
+    """Can its episodes be played by numbered meta-actions in the engine?"""
+    return not arm.backend and not arm.continuous and not arm.chooses
 
 
 def print_arms() -> None:
@@ -342,7 +342,8 @@ def _tried(config: Config, preset: Preset) -> gym.Env:
 
 def _unlike(names: Sequence[str]) -> list[str]:
     """One arm of each kind of environment."""
-    return list({shown(sorted(ARMS[name].config.items())): name for name in reversed(names)}.values())[::-1]
+    kinds = {name: shown(sorted({**ARMS[name].config, **ARMS[name].chooses}.items())) for name in reversed(names)}
+    return list({kind: name for name, kind in kinds.items()}.values())[::-1]
 
 
 def _tried_arm(config: Config, preset: Preset, arm: Arm) -> gym.Env:
@@ -384,8 +385,8 @@ def test_batch(config: Config, preset: Preset, arm: Arm, shield: Mapping[str, An
 
 
 def setting(config: Config, arm: Arm) -> dict[str, Any]:
-    """The environment's configuration, if it is told any, and how the ego behaves where roads cross."""
-    conduct = {"entry": config.entry, "intent": config.intent, "waiting": config.waiting}
+    """The environment's configuration, if it is told any, among what the ego chooses, and its conduct at junctions."""
+    conduct = {"entry": config.entry, "intent": config.intent, "waiting": config.waiting, **arm.chooses}
     configured = {**config.config, **arm.config}
     return {**conduct, "config": configured} if configured else conduct
 
@@ -504,6 +505,10 @@ def driver(config: Config, preset: Preset, arm: Arm, seed: int) -> drivers.Drive
     env.close()
     numbers = env.unwrapped.action_type.actions_indexes
     name = arm.settings["driver"]
+    if name == "semantic":
+        return drivers.best_value()
+    if name == "any semantic":
+        return drivers.any_valid(np.random.default_rng(seed))
     if name == "random":
         return drivers.uniform(len(numbers), np.random.default_rng(seed))
     return drivers.always(numbers["IDLE" if name == "idm" else name])  # that one drives itself

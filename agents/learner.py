@@ -27,6 +27,7 @@ LEARNERS = {
     "executed-dqn": "rss_shield.agents.baselines.executed_dqn",
     "qr-dqn": "rss_shield.agents.baselines.qr_dqn",
     "sac": "rss_shield.agents.baselines.sac",
+    "semantic-dqn": "rss_shield.agents.baselines.semantic_dqn",
 }
 _NO_HYPERPARAMETERS = ("seed", "device", "tensorboard_log", "verbose", "stats_window_size", "_init_setup_model")
 

@@ -9,18 +9,28 @@ import rss_shield.envs.worlds.occluded
 import rss_shield.envs.worlds.parking
 import rss_shield.envs.worlds.signalised  # noqa: F401  these register others
 from rss_shield.envs.highway.multi_agent import MultiAgentShield, has_agents
+from rss_shield.envs.highway.semantic import SemanticActions
 from rss_shield.envs.highway.wrapper import ShieldWrapper
 from rss_shield.envs.options import MODES, Options, Params, split
+from rss_shield.envs.semantic.settings import semantic_settings
 from rss_shield.envs.stock import make_stock
 
 
-def make(env_id: str, shield: str | None = "override", params: Params = None, **kwargs: Any) -> gym.Env:
+def make(
+    env_id: str,
+    shield: str | None = "override",
+    params: Params = None,
+    semantic_actions: Any = False,
+    **kwargs: Any,
+) -> gym.Env:
     """`gymnasium.make` with a shield around it: `MultiAgentShield` for several agents, `ShieldWrapper` for one.
 
     Args:
       env_id: "highway-fast-v0", "highway-v0", "two-way-v0", "merge-v0", "signalised-intersection-v0", ...
       shield: "override", "monitor", or None for the bare environment.
       params: the table in force, see `ShieldWrapper`.
+      semantic_actions: True, or a dict of the fields of `SemanticSettings` that differ: the agent chooses among
+        semantic actions in place of meta-actions, see `SemanticActions`.
       kwargs: the other options of a shield: `rules`, `intervention_penalty`, `penalty_on`, `record`, `entry`, `intent`,
         `waiting`, `traffic`, `examine`, `risk`, `measures`, `filter`, `filter_at`, `correction`, `evasion`,
         `replace`, `judge_params`, `judge_rules`, see `ShieldWrapper`. The rest is passed to `gymnasium.make`, e.g.
@@ -32,7 +42,7 @@ def make(env_id: str, shield: str | None = "override", params: Params = None, **
     if shield is not None and shield not in MODES:
         raise ValueError(f"shield = {shield!r}: expected 'override', 'monitor' or None")
     given, rest = split({"params": params, **kwargs})
-    options = Options.of(given)
+    options, semantic = Options.of(given), semantic_settings(semantic_actions)
     if shield is None and options.traffic != "stock":
         raise ValueError(f"traffic = {options.traffic!r}: expected 'stock' without a shield; use shield = 'monitor'")
     if shield is None and options.risk:
@@ -41,7 +51,6 @@ def make(env_id: str, shield: str | None = "override", params: Params = None, **
         env = make_stock(env_id, **rest)
     except gym.error.Error as error:
         raise ValueError(f"env_id = {env_id!r}: {error}") from None
-    if shield is None:
-        return env
-    wrapper = MultiAgentShield if has_agents(env.unwrapped) else ShieldWrapper
-    return wrapper(env, shield, **given)
+    if shield is not None:
+        env = (MultiAgentShield if has_agents(env.unwrapped) else ShieldWrapper)(env, shield, **given)
+    return env if semantic is None else SemanticActions(env, semantic)

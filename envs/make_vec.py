@@ -14,6 +14,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from rss_shield.envs.arguments import rules_of, seed_of, whole
 from rss_shield.envs.fast.config import Unsupported, compile_scenario
 from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
+from rss_shield.envs.fast.semantic import SemanticVectorEnv
 from rss_shield.envs.fast.vector import FastVectorEnv
 from rss_shield.envs.make import make
 from rss_shield.envs.options import (
@@ -28,6 +29,7 @@ from rss_shield.envs.options import (
     settings_for,
     split,
 )
+from rss_shield.envs.semantic.settings import SemanticSettings, check_unreplaced, semantic_settings
 from rss_shield.shield.risk import RiskSettings
 
 BACKENDS = ("fast", "highway-env")
@@ -43,6 +45,7 @@ def make_vec(
     threads: int = 1,
     autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
     wrappers: Sequence[Callable[[Any], Any]] = (),
+    semantic_actions: Any = False,
     **kwargs: Any,
 ) -> VectorEnv:
     """Environments side by side, each with a shield around its ego.
@@ -61,6 +64,7 @@ def make_vec(
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
       wrappers: put around in this order: gymnasium's `VectorWrapper`s around the whole on either backend, and wrappers
         of single environments around each where the backend is "highway-env".
+      semantic_actions: True, or a dict of the fields of `SemanticSettings` that differ, see `SemanticActions`.
       kwargs: `max_episode_steps`; `render_mode` (the engine knows "rgb_array"); `rules`, `intervention_penalty`,
         `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `evasion`, `replace`
         and `risk` of `ShieldWrapper`; and whatever else `make` takes (`traffic`, `judge_params`, ...) where the backend
@@ -86,14 +90,14 @@ def make_vec(
         name = getattr(within[0], "__name__", repr(within[0]))
         raise Unsupported(f"wrappers = [{name}]", "gymnasium.vector.VectorWrapper classes, or backend = 'highway-env'")
     given, rest = split({"params": params, **kwargs})
-    options = Options.of(given)
+    options, semantic = Options.of(given), semantic_settings(semantic_actions)
     envs: VectorEnv
     if backend == "highway-env":
-        arguments = {**given, **rest, "config": config}
+        arguments = {**given, **rest, "config": config, "semantic_actions": semantic_actions}
         one = partial(_make_counted, env_id, shield, within, arguments)
         envs = _SideBySide([one] * num_envs, autoreset_mode=autoreset_mode)
     else:
-        envs = _in_engine(env_id, num_envs, shield, options, config, threads, autoreset_mode, rest)
+        envs = _in_engine(env_id, num_envs, shield, options, config, threads, autoreset_mode, semantic, rest)
     for wrapper in around:
         envs = wrapper(envs)
     return envs
@@ -107,15 +111,22 @@ def _in_engine(
     config: dict | None,
     threads: int,
     autoreset_mode: AutoresetMode,
+    semantic: SemanticSettings | None,
     rest: dict[str, Any],
-) -> FastVectorEnv:
+) -> VectorEnv:
     _check_supported(options, rest)
     scenario = compile_scenario(env_id, config, max_episode_steps=rest.get("max_episode_steps"))
     settings = _settings_in(scenario.stock, shield, options) if shield is not None else None
     penalty, by_change = float(options.intervention_penalty), options.penalty_on == "change"
     replaces, risk = shield is not None and options.replace == "decision", _risk_in(shield, options)
+    wanted = autoreset_mode
+    if semantic is not None:
+        check_unreplaced(options)
+        if wanted == AutoresetMode.SAME_STEP:
+            autoreset_mode = AutoresetMode.DISABLED
     rules = settings, penalty, autoreset_mode, threads, by_change, replaces, risk, rest.get("render_mode")
-    return FastVectorEnv(scenario, num_envs, *rules)
+    env = FastVectorEnv(scenario, num_envs, *rules, semantic is not None)
+    return env if semantic is None else SemanticVectorEnv(env, semantic, wanted)
 
 
 def _is_for_batches(wrapper: Any) -> bool:

@@ -23,6 +23,7 @@ WANTED_CHANGE: Mapping[str, Any] = {"penalty_on": "change", FROM_OPTIONS: {"targ
 WANTED_SHARE: Mapping[str, Any] = {"penalty_on": "response", FROM_OPTIONS: {"target": "target_share"}}
 WANTED_COST: Mapping[str, Any] = {FROM_OPTIONS: {"cost_limit": "cost_limit"}}
 CONTINUOUS: Mapping[str, Any] = {"action": {"type": "ContinuousAction"}}
+SEMANTIC: Mapping[str, Any] = {"semantic_actions": {"features": True}}
 
 
 class Arm(NamedTuple):
@@ -39,6 +40,7 @@ class Arm(NamedTuple):
     train: str = ""  # how tables call the arm; "": its name
     masked: bool = False  # it chooses among permitted actions, where a shield is on
     backend: str = ""  # the only one that can play it
+    chooses: Mapping[str, Any] = {}  # options of `rss_shield.make` that say among what; none: as the environment has it
 
     @property
     def scripted(self) -> bool:
@@ -126,6 +128,30 @@ ROWS = (
     rival("cbf", "a control barrier function", "#888888"),
     rival("limits", "the always-on limits alone", "#AA4466"),
     rival("literal-def10", "Def. 10 as printed, once per decision", "#4477AA"),
+    Arm(
+        "semantic-planner",
+        "the best semantic action by value",
+        "#DDAA33",
+        SCRIPTED,
+        settings={"driver": "semantic"},
+        chooses=SEMANTIC,
+    ),
+    Arm(
+        "semantic-random",
+        "random semantic actions",
+        "#777711",
+        SCRIPTED,
+        settings={"driver": "any semantic"},
+        chooses=SEMANTIC,
+    ),
+    Arm(
+        "semantic-dqn",
+        "DQN on semantic actions behind the shield",
+        "#BB5566",
+        "semantic-dqn",
+        SHIELDED,
+        chooses=SEMANTIC,
+    ),
 )
 ARMS = {arm.name: arm for arm in ROWS}
 

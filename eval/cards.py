@@ -54,7 +54,7 @@ def card_of(arm: str, seed: int, run: dict[str, Any], episodes: pd.DataFrame) ->
             "hyperparameters": config.get(row.name if row.settings else row.learner, {}),
         },
         "masked": row.masked,
-        "tests": {name: dict(options) for name, options in row.tests.items()},
+        "tests": {name: {**options, **row.chooses} for name, options in row.tests.items()},
         "test_seeds": config["test_seeds"],
         "results": tests,
         "versions": {name: run[name] for name in ("python", "packages", "git_commit") if name in run},

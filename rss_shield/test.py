@@ -103,7 +103,7 @@ def main(arguments: list[str]) -> None:
         policy, config = policy_for(config, card)
         tests = tests_of(config, card)
         params = preset_of(config, card)
-        check_spaces(config, params, policy)
+        check_spaces(config, params, policy, next(iter(tests.values())))
     except (ValueError, OSError, ImportError) as error:
         fail(PROGRAM, f"{type(error).__name__}: {error}" if isinstance(error, ImportError) else str(error))
     played = []
@@ -257,9 +257,9 @@ def environments(config: Config, params: Any, shield: Mapping[str, Any], n_envs:
     )
 
 
-def check_spaces(config: Config, params: Any, policy: Tested) -> None:
-    """Does a model fit the environment?"""
-    env = environments(config, params, OFF_AND_ON["off"], 1)
+def check_spaces(config: Config, params: Any, policy: Tested, shield: Mapping[str, Any]) -> None:
+    """Does a model fit the environment, as it is in one of the tests?"""
+    env = environments(config, params, shield, 1)
     env.close()
     if policy.spaces is None:
         return

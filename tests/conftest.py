@@ -36,6 +36,7 @@ SLOW = frozenset(
         "envs/test_recorder",
         "envs/test_roads",
         "envs/test_several_contacts",
+        "envs/test_semantic_actions",
         "envs/test_shielded_traffic",
         "envs/test_signalised",
         "envs/test_standing",

@@ -61,8 +61,9 @@ MAY_IMPORT = {
     "envs.roads": ROADS | BELOW,
     "envs.worlds": {"envs.stock"} | ROADS | BELOW,
     "envs.decisions": ROADS | BELOW,
-    "envs.highway": ROADS | ENTRY | BELOW | {"envs.decisions", "envs.make", "shield.risk"},
-    "envs.fast": ROADS | ENTRY | BELOW | {"envs.decisions", "shield.risk"},
+    "envs.semantic": ROADS | BELOW | {"envs.worlds"},
+    "envs.highway": ROADS | ENTRY | BELOW | {"envs.decisions", "envs.semantic", "envs.make", "shield.risk"},
+    "envs.fast": ROADS | ENTRY | BELOW | {"envs.decisions", "envs.semantic", "shield.risk"},
     "eval.stats": set(),
     "eval.runs": {"eval.stats", "eval.metrics", "eval.plots", "eval.table", "eval.files"}
     | {"eval.config_option", "eval.interrupt"},

@@ -18,6 +18,7 @@ from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.draws import load_generator
 from rss_shield.envs.fast.drivers import note_change, take_meta_action
 from rss_shield.envs.fast.envs.intersection import let_traffic_flow, open_intersection
+from rss_shield.envs.fast.following import follow
 from rss_shield.envs.fast.foresight import foresee, make_desk
 from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.guard import (
@@ -47,6 +48,7 @@ from rss_shield.envs.fast.views.usual import observe
 from rss_shield.envs.options import PLANS, Settings
 from rss_shield.envs.roads.lanes import tightest
 from rss_shield.envs.roads.network import Network
+from rss_shield.envs.semantic.outlook import PLAN_FIELDS
 from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, rare
 from rss_shield.shield.comfort import RIDE
 from rss_shield.shield.junctions.controller import CROSSING
@@ -95,11 +97,12 @@ class Batch(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the agents want. Only one of the two kinds of command counts."""
+    """What the agents want. Only one of the first two kinds of command counts."""
 
     actions: np.ndarray  # `[E]` discrete actions
     commands: np.ndarray  # `[E, 2]` acceleration [m/s^2] and steering [rad]
     todo: np.ndarray  # `[E]` DECIDE, RESTART or STAY, overwritten
+    trajectories: np.ndarray | None  # `[E, F, 2]` what the egos carry out frame by frame, see `following`
 
 
 class Outputs(NamedTuple):
@@ -208,6 +211,7 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, ride, mete
         while first < episode.vehicles:  # a loop, lest the kernel contain it twice
             changing = think(cars, episode, first, last, changing, net, sight, config)
             if first == 0:
+                follow(e, frame, inputs.trajectories, cars, episode, lanes, sight)
                 changing = _guard(
                     cars, episode, changing, lanes, sight, distances, plans, ride, meter, watch, settings, step
                 )
@@ -331,6 +335,7 @@ class Engine:
       threads: how many threads share the work.
       by_change: the penalty is times the mean change of acceleration instead [m/s^2].
       risk: settings of the measure of risk around each ego, None = nobody asked; it needs a shield.
+      follows: the egos carry out `trajectories`, which are written before each step.
     """
 
     def __init__(
@@ -343,6 +348,7 @@ class Engine:
         threads: int = 1,
         by_change: bool = False,
         risk: RiskSettings | None = None,
+        follows: bool = False,
     ) -> None:
         n = scenario.capacity
         self.scenario = scenario
@@ -382,6 +388,8 @@ class Engine:
         )
         frames_of_decision = np.zeros((0, int(scenario.config["frames"][0]), n), self.batch.cars.dtype)
         self.film = Film(np.full(num_envs, -1, np.int64), frames_of_decision)
+        planned = num_envs, int(scenario.config["frames"][0]), PLAN_FIELDS
+        self.trajectories = np.zeros(planned) if follows else None
         self._seen: np.ndarray | None = None  # last observations
         last = scenario.glances[-1] if scenario.glances else None
         self._size = last.start + last.size if last else int(np.prod(scenario.observation_space.shape or 1))
@@ -411,7 +419,7 @@ class Engine:
         e = self.num_envs
         todo = np.full(e, RESTART, np.int8) if mask is None else np.where(mask, RESTART, STAY).astype(np.int8)
         seen, stays = self._seen, todo == STAY
-        outputs = self._run(Inputs(np.zeros(e, np.int64), np.zeros((e, 2)), todo))
+        outputs = self._run(Inputs(np.zeros(e, np.int64), np.zeros((e, 2)), todo, self.trajectories))
         outputs.observations[stays] = 0.0 if seen is None else seen[stays]
         return outputs
 
@@ -427,7 +435,7 @@ class Engine:
         commands = np.zeros((e, 2)) if commands is None else commands
         # compiled for these types and no others
         actions, commands = np.ascontiguousarray(actions, np.int64), np.ascontiguousarray(commands, np.float64)
-        return self._run(Inputs(actions, commands, np.full(e, DECIDE, np.int8)))
+        return self._run(Inputs(actions, commands, np.full(e, DECIDE, np.int8), self.trajectories))
 
     def action_masks(self) -> np.ndarray:
         """`[E, A]` bool: which meta-actions would pass the coming decision; see `FastVectorEnv.action_masks`."""

@@ -44,6 +44,17 @@ def steering_angle(lane, s, lateral, heading, speed, length):
 
 
 @inner
+def steering_within(lane, s, lateral, heading, speed, length, drift):
+    """`steering_angle` with a largest speed across the lane, `drift` [m/s], inf = none [rad]."""
+    if is_aligned(lane, s, lateral, heading, speed):
+        return 0.0
+    across = clip(-_KP_LATERAL * lateral, -drift, drift)
+    course = arcsin(clip(across / not_zero(speed), -1.0, 1.0))
+    slip = arcsin(_sine_of_slip(lane, s, heading, speed, length, course))
+    return clip(steering_for(slip), -MAX_STEERING, MAX_STEERING)
+
+
+@inner
 def steer(cars, count, lanes, sight):
     """`steering_angle` for the first `count` cars of `sight.some`, step by step for all of them at once.
 
