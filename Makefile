@@ -14,7 +14,7 @@ PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help compare $(ENVS:%=compare-%) test test-fast bench evidence campaign paper docs check clean
+.PHONY: help compare $(ENVS:%=compare-%) test test-fast prove bench evidence campaign paper docs check clean
 
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -33,6 +33,9 @@ test: $(VENV)/installed-dev  ## run every test
 
 test-fast: $(VENV)/installed-dev  ## run the tests of single functions and small scenes (a minute)
 	$(BIN)/python -m pytest $(PYTEST_ARGS) -m "not slow"
+
+prove: $(VENV)/installed-dev  ## prove the induction with z3 and write the page (minutes)
+	$(BIN)/python tests/proofs/prove.py --write $(ARGS)
 
 bench: $(VENV)/installed-dev  ## run the benchmarks
 	$(BIN)/python -m pytest bench --benchmark-only -q -s
@@ -76,7 +79,7 @@ $(VENV)/installed: pyproject.toml constraints.txt
 	@touch $@
 
 $(VENV)/installed-dev: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test,oracle,bench]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test,oracle,bench,proofs]'
 	@touch $@
 
 $(VENV)/installed-docs: $(VENV)/installed

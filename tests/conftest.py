@@ -77,6 +77,7 @@ SLOW = frozenset(
         "fast/test_ufuncs",
         "fast/test_vector",
         "fast/test_views",
+        "proofs/test_counterexamples",
         "shield/test_adrss_oracle",
         "shield/test_anticipation",
         "shield/test_anything",
