@@ -20,6 +20,7 @@ from model import (
     d_min_no_credit,
     dt,
     euler_margin,
+    fastest_next,
     forward_reach,
     front,
     in_range,
@@ -70,11 +71,20 @@ s, s_other = z3.Reals("s s_other")
 
 def _uses_no_more(v, u, s, car, b) -> tuple[list[Statement], z3.BoolRef]:
     """A car that keeps its response uses no more of its budget than it drives: (statements, what they say)."""
-    table = [dt > 0, *in_range(car), b > 0, s >= 0, whole_frames(s), keeps_its_response(v, u, s, car, b)]
+    table = [dt > 0, *in_range(car), b > 0, s >= 0, whole_frames(s)]
+    fastest, slower, w = fastest_next(v, s, car, b), z3.Real("slower"), z3.Real("w")
+    worst = way(fastest, after_a_frame(s), car, b) <= way(v, s, car, b) - v * dt
+    less = way(slower, w, car, b) <= way(u, w, car, b)
     goal = way(u, after_a_frame(s), car, b) <= way(v, s, car, b) - v * dt
+    anyhow = [dt > 0, *in_range(car), b > 0, w >= 0, slower <= u]
+    left = after_a_frame(s)
+    terms = [way(fastest, left, car, b), way(u, left, car, b), way(v, s, car, b)]
+    both = [worst, way(u, left, car, b) <= way(fastest, left, car, b)]
     return [
-        Statement("frame, coming", [*table, v >= 0], goal),
-        Statement("frame, backing away", [*table, v < 0], goal),
+        Statement("frame, at its fastest, coming", [*table, v >= 0], worst),
+        Statement("frame, at its fastest, backing away", [*table, v < 0], worst),
+        Statement("frame, slower needs less", anyhow, less),
+        _without(terms, Statement("frame", both, goal)),
     ], goal
 
 
@@ -407,7 +417,7 @@ def _keeps_a_share() -> list[Statement]:
 
 
 INVARIANTS = (
-    Invariant("one car", "who keeps its response uses no more than its share", "C1 C2 C3 C5", _one_car),
+    Invariant("one car", "who keeps its response uses no more than its share", "C1 C2 C3 C5", _one_car, quick=True),
     Invariant("same direction", "who follows does not touch who leads", "C1 C2 C3 C4 C5 C6", _following),
     Invariant(
         "head-on",

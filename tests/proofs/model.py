@@ -72,11 +72,16 @@ def least_way(v, b):
     return stopping_distance(v, b) + v * dt / 2
 
 
-def keeps_its_response(v, v_next, s, car, b) -> z3.BoolRef:
-    """A car that must stop, for one frame: C1 while it may still respond, C3 afterwards."""
+def fastest_next(v, s, car, b):
+    """Highest speed after a frame of a car that must stop: C1 while it may still respond, C3 afterwards."""
     cap = z3.If(car.v_cap > v, car.v_cap, v)
-    free = z3.And(v_next <= v + car.a_max_accel * dt, v_next <= cap)
-    return z3.If(s >= dt, free, v_next <= z3.If(v > b * dt, v - b * dt, ZERO))
+    free = z3.If(v + car.a_max_accel * dt < cap, v + car.a_max_accel * dt, cap)
+    return z3.If(s >= dt, free, z3.If(v > b * dt, v - b * dt, ZERO))
+
+
+def keeps_its_response(v, v_next, s, car, b) -> z3.BoolRef:
+    """A car that must stop, for one frame."""
+    return v_next <= fastest_next(v, s, car, b)
 
 
 def leads(v, v_next, car) -> z3.BoolRef:
