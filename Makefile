@@ -14,7 +14,7 @@ PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help compare $(ENVS:%=compare-%) test test-fast prove bench evidence campaign paper docs check clean
+.PHONY: help compare $(ENVS:%=compare-%) test test-fast prove mutants bench evidence campaign paper docs check clean
 
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -36,6 +36,12 @@ test-fast: $(VENV)/installed-dev  ## run the tests of single functions and small
 
 prove: $(VENV)/installed-dev  ## prove the induction with z3 and write the page (minutes)
 	$(BIN)/python tests/proofs/prove.py --write $(ARGS)
+
+# a sample of each package, then the page; what was tested before is not tested again
+mutants: $(VENV)/installed-dev  ## alter the sources of the shield and see whether tests notice (an hour)
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[mutants]'
+	$(BIN)/python bench/mutants.py $(ARGS)
+	$(BIN)/python bench/mutants.py --write
 
 bench: $(VENV)/installed-dev  ## run the benchmarks
 	$(BIN)/python -m pytest bench --benchmark-only -q -s

@@ -21,6 +21,7 @@ SLOW = frozenset(
         "envs/test_egos",
         "envs/test_evasion",
         "envs/test_findings",
+        "envs/test_faults",
         "envs/test_free_steering",
         "envs/test_hostile",
         "envs/test_judge",
