@@ -14,7 +14,7 @@ PYTEST_ARGS ?= -n 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help compare $(ENVS:%=compare-%) test test-fast bench evidence campaign paper docs check clean
+.PHONY: help compare $(ENVS:%=compare-%) test test-fast prove mutants bench evidence campaign paper docs check clean
 
 help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -33,6 +33,15 @@ test: $(VENV)/installed-dev  ## run every test
 
 test-fast: $(VENV)/installed-dev  ## run the tests of single functions and small scenes (a minute)
 	$(BIN)/python -m pytest $(PYTEST_ARGS) -m "not slow"
+
+prove: $(VENV)/installed-dev  ## prove the induction with z3 and write the page (minutes)
+	$(BIN)/python tests/proofs/prove.py --write $(ARGS)
+
+# a sample of each package, then the page; what was tested before is not tested again
+mutants: $(VENV)/installed-dev  ## alter the sources of the shield and see whether tests notice (an hour)
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[mutants]'
+	$(BIN)/python bench/mutants.py $(ARGS)
+	$(BIN)/python bench/mutants.py --write
 
 bench: $(VENV)/installed-dev  ## run the benchmarks
 	$(BIN)/python -m pytest bench --benchmark-only -q -s
@@ -76,7 +85,7 @@ $(VENV)/installed: pyproject.toml constraints.txt
 	@touch $@
 
 $(VENV)/installed-dev: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test,oracle,bench]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test,oracle,bench,proofs]'
 	@touch $@
 
 $(VENV)/installed-docs: $(VENV)/installed

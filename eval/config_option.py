@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from rss_shield.eval.files import to_json
+from rss_shield.eval.files import plainly, to_json
 
 PREFIX = "--config."
 Keys = tuple[str, ...]  # of a nested value: ("observation", "type")
@@ -32,7 +32,9 @@ def read_config(text: str) -> dict[str, Any]:
         raise ValueError(f"{text}: expected a file .json, .toml, .yaml or .yml, or JSON itself")
     try:
         content = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise ValueError(plainly(error)) from None
+    except UnicodeDecodeError as error:
         raise ValueError(f"{text}: {error}") from None
     return _object(text, _parsed(content, kind, text))
 

@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
 from tqdm import tqdm
@@ -40,9 +41,10 @@ def run_jobs(jobs: Sequence[Job], n_workers: int) -> None:
     # forked or spawned from a clean process: this one may hold threads and a GPU
     methods = multiprocessing.get_all_start_methods()
     context: Any = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
-    news, stop = context.Queue(), context.Event()
+    # a worker that waits for an event would never let it be set once it was killed; the end of a pipe waits for nobody
+    news, (ends, goes_on) = context.Queue(), context.Pipe(duplex=False)
     bars: dict[int, tqdm] = {}
-    pool = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (news, stop))
+    pool = ProcessPoolExecutor(min(n_workers, len(jobs)), context, _start_worker, (news, ends))
     try:
         with children_ignore_interrupts():
             left = {pool.submit(_run_in_worker, i, job.work) for i, job in enumerate(jobs)}
@@ -53,8 +55,9 @@ def run_jobs(jobs: Sequence[Job], n_workers: int) -> None:
                 done.result()
         _show(news, jobs, bars)
     finally:
-        stop.set()  # first of all: then nothing that is still to be waited for takes long
+        goes_on.close()  # first of all: then nothing that is still to be waited for takes long
         pool.shutdown(cancel_futures=True)
+        ends.close()
         for bar in bars.values():
             bar.close()
 
@@ -76,16 +79,15 @@ def _show(news: Any, jobs: Sequence[Job], bars: dict[int, tqdm]) -> None:
 _worker: dict[str, Any] = {}  # how a worker process reports
 
 
-def _start_worker(news: Any, stop: Any) -> None:
+def _start_worker(news: Any, ends: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
-    for end in (multiprocessing.parent_process().join, stop.wait):  # type: ignore[union-attr]
-        threading.Thread(target=_exit_after, args=(end,), daemon=True).start()
+    threading.Thread(target=_exit_after, args=(ends,), daemon=True).start()
     _worker["news"] = news
 
 
-def _exit_after(end: Callable[[], Any]) -> None:
+def _exit_after(ends: Connection) -> None:
     """A worker must not go on for ever when its parent was killed, nor to the end of its job when it must stop."""
-    end()
+    ends.poll(None)  # nothing is ever sent: it ends when the parent closes the other end, or is gone
     os._exit(1)
 
 

@@ -1,5 +1,6 @@
 """Distances of whatever holds numbers: lists, arrays, columns of tables."""
 
+import functools
 import inspect
 from numbers import Real
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba.core.errors import NumbaError
 
-from rss_shield.shield._numba.compiled import compiled_for_arrays
+from rss_shield.shield._numba.compiled import INTERPRETED, compiled_for_arrays
 from rss_shield.shield.params import RSSParams
 
 _TABLES = ("rear", "front", "left", "right", "correct", "wrong")  # arguments that are `RSSParams`
@@ -27,21 +28,24 @@ def compiled_for_anything(function: Any, arrays: bool = True) -> Any:
     """
     dispatcher = compiled_for_arrays(function)
     usual: Any = type(dispatcher)
+    run = (lambda self, *given, **named: function(*given, **named)) if INTERPRETED else usual.__call__
     names = tuple(inspect.signature(function).parameters)
     plain = tuple(RSSParams if name in _TABLES else float for name in names if name != "mode")
 
     def call(self: Any, *given: Any, **named: Any) -> Any:
         if not named and tuple(map(type, given)) == plain:
-            return usual.__call__(self, *given)
+            return run(self, *given)
         positional = [_ready(self, name, value, arrays) for name, value in zip(names, given, strict=False)]
         by_name = {name: _ready(self, name, value, arrays) for name, value in named.items()}
         _check_shapes(self, dict(zip(names, positional, strict=False)) | by_name)
         try:
-            return usual.__call__(self, *positional, *given[len(names) :], **by_name)
+            return run(self, *positional, *given[len(names) :], **by_name)
         except NumbaError:
             kinds = ", ".join(f"{name} {type(value).__name__}" for name, value in zip(names, positional, strict=False))
             raise ValueError(f"{self.__name__}: {kinds}: expected {', '.join(names)} as documented") from None
 
+    if INTERPRETED:
+        return functools.wraps(function)(functools.partial(call, function))
     dispatcher.__class__ = type("Anything", (usual,), {"__call__": call, "__doc__": usual.__doc__})
     return dispatcher
 

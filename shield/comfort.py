@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield._numba.compiled import compiled, inner, records
 from rss_shield.shield.geometry import wrap_angle
 
 A, JERK, LAT_A, LAT_JERK, YAW_A = range(5)  # the quantities measured
@@ -26,7 +26,7 @@ LONGEST_GAP = 100.0  # time gaps are reported up to this [s] ...
 FOLLOWING = 5.0  # ... and averaged over the frames on which they are shorter than this
 
 # What is remembered of a ride. A new record is all zeros.
-RIDE = np.dtype(
+RIDE = records(
     [
         ("samples", "i8"),  # taken in since reset
         ("speed", "f8"),  # on the last one [m/s]
@@ -45,8 +45,7 @@ RIDE = np.dtype(
         ("least_gap", "f8"),  # time gap to the car ahead [s]; 0 = nobody was ahead yet
         ("sum_of_gaps", "f8"),
         ("gaps", "i8"),  # frames behind a car ahead
-    ],
-    align=True,
+    ]
 )
 
 

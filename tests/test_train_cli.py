@@ -112,7 +112,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--config.action.type ContinuousAction", "config.action = {'type': 'ContinuousAction'}: not possible in"),
         ("--config.duration.seconds 3", "--config.duration.seconds: config.duration = 30 has no keys of its own"),
         ("--config.lanes-count", "--config.lanes-count: expected a key and a value"),
-        ("--config nowhere.json", "--config: nowhere.json: [Errno 2] No such file or directory"),
+        ("--config nowhere.json", "--config: nowhere.json: no such file or directory"),
         ("--config [1]", "--config: [1]: expected a file .json, .toml, .yaml or .yml, or JSON itself"),
     ],
 )

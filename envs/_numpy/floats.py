@@ -1,5 +1,6 @@
 """The arithmetic of numpy and Python to the last bit, for compiled code."""
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rss_shield.envs._numpy.blas import FUSED_FIRST, FUSED_SECOND, ROUNDING
-from rss_shield.shield._numba.compiled import inner
+from rss_shield.shield._numba.compiled import INTERPRETED, inner
 
 _intrinsic: Any = intrinsic
 
@@ -23,13 +24,20 @@ def _fma(typing_context, a, b, c):
     return signature, generate
 
 
+def _fma_of_fractions(a, b, c):
+    return float(Fraction(a) * Fraction(b) + Fraction(c))
+
+
+_fused: Any = _fma_of_fractions if INTERPRETED else _fma
+
+
 @inner
 def dot(ax, ay, bx, by):
     """`np.dot` of two plane vectors, rounded as it is here: another rounding would differ in one of four."""
     if ROUNDING == FUSED_SECOND:
-        return _fma(ay, by, ax * bx)
+        return _fused(ay, by, ax * bx)
     if ROUNDING == FUSED_FIRST:
-        return _fma(ax, bx, ay * by)
+        return _fused(ax, bx, ay * by)
     return ax * bx + ay * by
 
 

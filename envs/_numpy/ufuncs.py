@@ -17,6 +17,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from rss_shield.shield._numba.compiled import INTERPRETED
+
 _intrinsic: Any = intrinsic
 _PREFIX = "highway_shield_numpy_"
 
@@ -118,31 +120,36 @@ def _generate_each(ufunc, arrays):
 # ---------------------------------------------------------------- of one number
 
 
-@_intrinsic
+def _of_one(function):
+    """Where nothing is compiled, numpy's own function of the same name."""
+    return getattr(np, function.__name__) if INTERPRETED else _intrinsic(function)
+
+
+@_of_one
 def tan(typing_context, x):
     """`np.tan` of a float."""
     return _generate_one(np.tan)
 
 
-@_intrinsic
+@_of_one
 def arctan(typing_context, x):
     """`np.arctan` of a float."""
     return _generate_one(np.arctan)
 
 
-@_intrinsic
+@_of_one
 def arcsin(typing_context, x):
     """`np.arcsin` of a float."""
     return _generate_one(np.arcsin)
 
 
-@_intrinsic
+@_of_one
 def arctan2(typing_context, y, x):
     """`np.arctan2` of two floats."""
     return _generate_one(np.arctan2)
 
 
-@_intrinsic
+@_of_one
 def power(typing_context, base, exponent):
     """`np.power` of two floats."""
     return _generate_one(np.power)
@@ -152,31 +159,44 @@ def power(typing_context, base, exponent):
 # The result must not be one of the arguments: numpy would take another function.
 
 
-@_intrinsic
+def _of_each(function):
+    """Likewise, for the first n numbers."""
+    if not INTERPRETED:
+        return _intrinsic(function)
+    ufunc = getattr(np, function.__name__.removesuffix("_each"))
+
+    def each(*arrays_and_n):
+        *arrays, n = arrays_and_n
+        ufunc(*(array[:n] for array in arrays[:-1]), out=arrays[-1][:n])
+
+    return each
+
+
+@_of_each
 def tan_each(typing_context, x, out, n):
     """`np.tan` of floats."""
     return _generate_each(np.tan, (x, out))
 
 
-@_intrinsic
+@_of_each
 def arctan_each(typing_context, x, out, n):
     """`np.arctan` of floats."""
     return _generate_each(np.arctan, (x, out))
 
 
-@_intrinsic
+@_of_each
 def arcsin_each(typing_context, x, out, n):
     """`np.arcsin` of floats."""
     return _generate_each(np.arcsin, (x, out))
 
 
-@_intrinsic
+@_of_each
 def arctan2_each(typing_context, y, x, out, n):
     """`np.arctan2` of floats."""
     return _generate_each(np.arctan2, (y, x, out))
 
 
-@_intrinsic
+@_of_each
 def power_each(typing_context, bases, exponents, out, n):
     """`np.power` of floats."""
     return _generate_each(np.power, (bases, exponents, out))

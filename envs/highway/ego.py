@@ -11,6 +11,7 @@ from rss_shield.envs.options import LANES, OPEN_SPACE, PLANS, Settings
 from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, roads_along, tightest
 from rss_shield.envs.roads.slip import slip_of, steering_of
 from rss_shield.envs.roads.steering import MAX_SLIP
+from rss_shield.shield._numba.compiled import records
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
@@ -99,7 +100,7 @@ def log_of(frames: list[Frame]) -> Log:
 
 
 # what is counted of one ego, see `shield.tally`
-DECISION, EPISODE = np.dtype(DECISION_FIELDS, align=True), np.dtype(EPISODE_FIELDS, align=True)
+DECISION, EPISODE = records(DECISION_FIELDS), records(EPISODE_FIELDS)
 
 
 class ShieldedEgo:

@@ -13,12 +13,12 @@ from highway_env.vehicle.controller import ControlledVehicle
 
 from rss_shield.envs._numpy.floats import dot, norm, wrap_to_pi
 from rss_shield.envs._numpy.ufuncs import arctan, arctan2
-from rss_shield.shield._numba.compiled import compiled, inner, part
+from rss_shield.shield._numba.compiled import compiled, inner, part, records
 
 CAR_LENGTH, CAR_WIDTH = 5.0, 2.0  # of every vehicle of highway-env [m]
 STRAIGHT, SINE, CIRCULAR = range(3)
 
-LANE = np.dtype(
+LANE = records(
     [
         ("kind", "i8"),  # STRAIGHT, SINE or CIRCULAR
         ("road", "i8"),  # index of the road it belongs to
@@ -47,18 +47,16 @@ LANE = np.dtype(
         ("right", "f8"),
         ("low", "f8"),  # and in y [m]
         ("high", "f8"),
-    ],
-    align=True,
+    ]
 )
 
-ROAD = np.dtype(
+ROAD = records(
     [
         ("first", "i8"),  # its leftmost lane
         ("lanes", "i8"),
         ("origin", "i8"),  # node where it starts
         ("end", "i8"),  # node where it ends
-    ],
-    align=True,
+    ]
 )
 
 

@@ -35,7 +35,7 @@ from rss_shield.envs.roads.paths import (
     walks,
     widened,
 )
-from rss_shield.shield._numba.compiled import compiled
+from rss_shield.shield._numba.compiled import compiled, records
 from rss_shield.shield.geometry import wrap_angle
 from rss_shield.shield.junctions.conflict_areas import (
     COS,
@@ -76,7 +76,7 @@ _CREEPS = 0.5  # who is slower may stay where it is [m/s]
 _ROLL = 1.05  # a wreck rolls to rest in this time at its speed [s]
 
 # One road user in the world, as a simulator says.
-CAR_ON_ROAD = np.dtype(
+CAR_ON_ROAD = records(
     [
         ("x", "f8"),
         ("y", "f8"),
@@ -90,8 +90,7 @@ CAR_ON_ROAD = np.dtype(
         ("choice", "i8"),  # row of `Roads.choices`: paths of its route, -1 = nobody knows
         ("wreck", "?"),
         ("alert", "?"),  # is known to wait, not to have broken down
-    ],
-    align=True,
+    ]
 )
 
 

@@ -25,6 +25,8 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
+# with NUMBA_DISABLE_JIT=1 nothing is compiled: for debuggers, and for tests of altered sources
+INTERPRETED = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
 _njit: Any = numba.njit  # its published types lack some options
 _parts: Any
 try:
@@ -94,6 +96,8 @@ def compiled_for_arrays(function: Callable[..., Any]) -> Any:
 
 def only_inside(function: Callable[..., Any], rare: bool = False, **options: Any) -> Any:
     """Compile what is called from compiled functions only: it becomes a part of them."""
+    if INTERPRETED:
+        return function
     return _njit(**options)(function) if _parts is None else _parts.only_inside(function, rare, **options)
 
 
@@ -105,6 +109,8 @@ def also_outside(function: Callable[..., Any], sources: str = "", **options: Any
       sources: a text that stands for all that it is made of, to keep it on disk for later runs; "" = it is not kept.
       options: of numba.
     """
+    if INTERPRETED:
+        return function
     make = _njit if _parts is None else _parts.also_outside
     if not sources:
         return make(function, **options)
@@ -142,6 +148,12 @@ def package_root(file: Path) -> Path:
 @cache
 def _stamp(folder: Path) -> str:
     return fingerprint(*folder.rglob("*.py"))
+
+
+def records(fields: list[Any]) -> np.dtype:
+    """A type of record whose fields functions read and write as attributes, compiled or not."""
+    plain = np.dtype(fields, align=True)
+    return np.dtype((np.record, plain)) if INTERPRETED else plain
 
 
 def choose(condition: Any, this: Any, that: Any) -> Any:

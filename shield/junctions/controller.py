@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import apart, compiled, inner
+from rss_shield.shield._numba.compiled import apart, compiled, inner, records
 from rss_shield.shield.definitions.kinematics import stopping_distance, time_to_collision
 from rss_shield.shield.junctions.conflict_areas import CELL, boxes_overlap, cell_of
 from rss_shield.shield.junctions.easing import RISE, SEARCH, caps
@@ -68,7 +68,7 @@ _REVERSING = 0.1  # slower than this backwards is standing [m/s]
 _JITTER = 0.02  # speeds of others are read off a simulator that integrates in steps [m/s]
 
 # What the ego remembers of one road user. SI units.
-CROSSING = np.dtype(
+CROSSING = records(
     [
         ("age", "i8"),  # samples since first sight
         ("since", "i8"),  # frames since the last sample with a plan; 0 = there is one now
@@ -94,12 +94,11 @@ CROSSING = np.dtype(
         ("other_broke", "i8"),
         ("other_excess", "f8"),
         ("was_lawless", "?"),  # the other broke one up to this sample, though the ego may have a plan toward it again
-    ],
-    align=True,
+    ]
 )
 
 # What the ego reads of one road user on one sample. SI units.
-SAMPLE = np.dtype(
+SAMPLE = records(
     [
         ("x", "f8"),
         ("y", "f8"),
@@ -113,18 +112,16 @@ SAMPLE = np.dtype(
         ("strays", "?"),  # has gone on where none of the ways leads that it might be on before
         ("astray", "?"),  # on no lane at all
         ("alert", "?"),  # is known to wait: nobody counts on it to stand
-    ],
-    align=True,
+    ]
 )
 
 # The plan in force.
-PLAN = np.dtype(
+PLAN = records(
     [
         ("go", "i8"),  # frames of throttle left, -1 = no plan
         ("held_at", "f8"),  # acceleration to which the ego was held back on the last frame, inf = it was not [m/s^2]
         ("wronged", "?"),  # somebody broke a duty, and there has been no plan since that stays clear of everybody
-    ],
-    align=True,
+    ]
 )
 
 

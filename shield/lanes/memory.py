@@ -6,9 +6,7 @@ road user, make up the memory of a scene. A new record is all zeros.
 
 from typing import NamedTuple
 
-import numpy as np
-
-from rss_shield.shield._numba.compiled import compiled, inner, rare
+from rss_shield.shield._numba.compiled import compiled, inner, rare, records
 from rss_shield.shield.definitions.response import (
     CORRECT,
     FRONT,
@@ -22,7 +20,7 @@ from rss_shield.shield.definitions.response import (
 )
 from rss_shield.shield.lanes.pair import assess
 
-MEMORY = np.dtype(
+MEMORY = records(
     [
         ("age", "i8"),  # samples taken in since first sight, 0 = not seen yet
         ("skipped", "?"),  # the last sample was safe beyond doubt and is not taken in yet
@@ -63,8 +61,7 @@ MEMORY = np.dtype(
         ("ego_excess", "f8"),
         ("other_broke", "i8"),
         ("other_excess", "f8"),
-    ],
-    align=True,
+    ]
 )
 
 

@@ -11,7 +11,7 @@ from rss_shield.shield.geometry import signed_gap
 from rss_shield.shield.sampling import euler_margin, lateral_euler_margin, reach_from_rest, sampling_margin
 
 # One road user in the lane frame of the ego. SI units; lateral values positive to the right.
-ROAD_USER = np.dtype(
+ROAD_USER = records(
     [
         ("s", "f8"),  # arc length of the centre
         ("y", "f8"),  # lateral offset of the centre
@@ -26,8 +26,7 @@ ROAD_USER = np.dtype(
         ("half_width", "f8"),
         ("in_own_lane", "?"),  # drives in a lane meant for its direction
         ("wreck", "?"),  # has crashed, or never moves: it may stop on the spot
-    ],
-    align=True,
+    ]
 )
 
 

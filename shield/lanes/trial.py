@@ -6,7 +6,7 @@ so that who judges a log afterwards and who judged on the spot say the same.
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled_for_arrays, inner
+from rss_shield.shield._numba.compiled import compiled_for_arrays, inner, records
 from rss_shield.shield.command import Command
 from rss_shield.shield.lanes.judge import NEXT_FRAME, NOW, audit_command, blame_ego, judge_motion_in, sum_up
 from rss_shield.shield.lanes.memory import (
@@ -22,7 +22,7 @@ from rss_shield.shield.lanes.pair import assess
 from rss_shield.shield.verdicts import KEPT
 
 # One pair on one sample, from the view of the first of the two.
-PAIR_FRAME = np.dtype(
+PAIR_FRAME = records(
     [
         ("present", "?"),
         ("dangerous", "?"),
@@ -44,12 +44,11 @@ PAIR_FRAME = np.dtype(
         ("ego_excess", "f8"),
         ("other_broke", "i8"),
         ("other_excess", "f8"),
-    ],
-    align=True,
+    ]
 )
 
 # The verdict of a contact; see `Verdict`.
-VERDICT = np.dtype(
+VERDICT = records(
     [
         ("frame", "i8"),  # sample at which it was reached, -1 = no contact
         ("verdict", "i8"),
@@ -59,8 +58,7 @@ VERDICT = np.dtype(
         ("ego_excess", "f8"),
         ("other_duty", "i8"),
         ("other_excess", "f8"),
-    ],
-    align=True,
+    ]
 )
 
 

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield._numba.compiled import compiled, inner, records
 from rss_shield.shield.risk.factors import Factors, type_factor
 from rss_shield.shield.risk.ranges import NOT_NEGATIVE, POSITIVE, in_range
 from rss_shield.shield.risk.settings import KMH, RADIAL, RiskSettings
 
 # Every road user, the ego included.
-SOURCE = np.dtype(
+SOURCE = records(
     [
         ("x", "f8"),  # position of the centre [m]
         ("y", "f8"),
@@ -24,8 +24,7 @@ SOURCE = np.dtype(
         ("type_factor", "f8"),  # Psi_T [1]
         ("road", "f8"),  # R [yuan] of the road where it is
         ("driver", "f8"),  # DR [1] of who drives it
-    ],
-    align=True,
+    ]
 )
 
 

@@ -8,21 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled
+from rss_shield.shield._numba.compiled import compiled, records
 from rss_shield.shield.risk.ranges import NOT_NEGATIVE, POSITIVE, in_range, one_of
 from rss_shield.shield.risk.settings import RiskSettings
 
 MARKINGS = ("none", "striped", "solid", "edge")
 _ETA = dict(none="no_marking", striped="striped_marking", solid="solid_marking", edge="road_edge")
 
-MARKING = np.dtype(
+MARKING = records(
     [
         ("eta", "f8"),  # [1] weight
         ("distance", "f8"),  # r [m] from the ego's centre, >= 0
         ("approach", "f8"),  # w [m/s] toward the marking, negative when leaving
         ("lane_width", "f8"),  # D [m]
-    ],
-    align=True,
+    ]
 )
 
 

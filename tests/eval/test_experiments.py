@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from places import ROOT
 
+from rss_shield.cli import main
 from rss_shield.eval.runs.experiment import Range, experiment_of, read_experiment
 from rss_shield.eval.runs.names import flat, nested
 from rss_shield.eval.runs.store import Store
@@ -124,6 +125,12 @@ def test_an_error_names_the_file(tmp_path):
     (tmp_path / "bad.yaml").write_text("policys: [idle]\n")
     with pytest.raises(ValueError, match=r"bad\.yaml: the experiment has an unknown key 'policys'"):
         read_experiment(tmp_path / "bad.yaml")
+
+
+def test_a_file_that_is_not_there_is_named_as_people_name_it(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["sweep", str(tmp_path / "none.yaml")])
+    assert capsys.readouterr().err.endswith("none.yaml: no such file or directory\n")
 
 
 NAMES = st.text("abc", min_size=1, max_size=2)

@@ -2,7 +2,9 @@
 
 import contextlib
 import os
+import signal
 import time
+from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 
 import pytest
@@ -69,6 +71,19 @@ def test_what_a_job_does_is_stopped_at_once_wherever_it_is(busy):
     began = time.perf_counter()
     with pytest.raises(ZeroDivisionError, match="on purpose"):
         run_jobs(jobs, 2)
+    assert time.perf_counter() - began < 20
+
+
+def kill_the_worker(progress):
+    progress(1)
+    time.sleep(0.5)  # by then every worker waits to be told to stop
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_worker_that_is_killed_is_an_error_and_stops_the_others_at_once():
+    began = time.perf_counter()
+    with pytest.raises(BrokenProcessPool):
+        run_jobs([Job("is killed", 2, "thing", kill_the_worker), Job("busy", 2, "thing", sleep_for_ever)], 2)
     assert time.perf_counter() - began < 20
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rss_shield.eval.files import atomic, write_json
+from rss_shield.eval.files import atomic, plainly, write_json
 from rss_shield.eval.suite.judge.findings import json_of, pair_frames, text_of
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.risk import risk_lines, risk_table
@@ -22,8 +22,8 @@ def run(arguments: list[str] | None = None) -> None:
     try:
         for path in options.files:
             _judge(path, options)
-    except (ValueError, FileNotFoundError, ModuleNotFoundError) as error:
-        sys.exit(f"rss-shield judge: {error}")
+    except (ValueError, OSError, ModuleNotFoundError) as error:
+        sys.exit(f"rss-shield judge: {plainly(error)}")
 
 
 def _parser() -> argparse.ArgumentParser:
