@@ -12,9 +12,10 @@ from highway_env.envs.common.action import DiscreteMetaAction
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.arguments import rules_of, seed_of, whole
-from rss_shield.envs.fast.config import Unsupported, compile_scenario
+from rss_shield.envs.fast.config import Scenario, Unsupported, compile_scenario
 from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
 from rss_shield.envs.fast.vector import FastVectorEnv
+from rss_shield.envs.fast.views.record import KINEMATICS, TIME_TO_COLLISION
 from rss_shield.envs.make import make
 from rss_shield.envs.options import (
     MODES,
@@ -25,9 +26,12 @@ from rss_shield.envs.options import (
     check_environment,
     check_replace,
     check_risk,
+    scheme_of,
+    sensing_in,
     settings_for,
     split,
 )
+from rss_shield.envs.sensing import Sensing
 from rss_shield.shield.risk import RiskSettings
 
 BACKENDS = ("fast", "highway-env")
@@ -62,9 +66,9 @@ def make_vec(
       wrappers: put around in this order: gymnasium's `VectorWrapper`s around the whole on either backend, and wrappers
         of single environments around each where the backend is "highway-env".
       kwargs: `max_episode_steps`; `render_mode` (the engine knows "rgb_array"); `rules`, `intervention_penalty`,
-        `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `evasion`, `replace`
-        and `risk` of `ShieldWrapper`; and whatever else `make` takes (`traffic`, `judge_params`, ...) where the backend
-        is "highway-env".
+        `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `evasion`,
+        `replace`, `risk` and, along lanes, `sensing` of `ShieldWrapper`; and whatever else `make` takes (`traffic`,
+        `judge_params`, ...) where the backend is "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.
@@ -115,7 +119,7 @@ def _in_engine(
     penalty, by_change = float(options.intervention_penalty), options.penalty_on == "change"
     replaces, risk = shield is not None and options.replace == "decision", _risk_in(shield, options)
     rules = settings, penalty, autoreset_mode, threads, by_change, replaces, risk, rest.get("render_mode")
-    return FastVectorEnv(scenario, num_envs, *rules)
+    return FastVectorEnv(scenario, num_envs, *rules, _sensing_in(scenario, shield, options))
 
 
 def _is_for_batches(wrapper: Any) -> bool:
@@ -142,6 +146,26 @@ def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
         kind = type(stock.action_type).__name__
         raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
     return settings
+
+
+def _sensing_in(scenario: Scenario, shield: str | None, options: Options) -> Sensing | None:
+    """What goes wrong with what is seen."""
+    if options.sensing is not None and shield is None:
+        raise ValueError(f"sensing = {options.sensing!r}: expected None without a shield; use shield = 'monitor'")
+    sensing = sensing_in(scenario.stock, options.sensing)
+    if sensing is None:
+        return None
+    if scheme_of(scenario.stock) == PLANS:
+        raise Unsupported("sensing where roads cross", "backend = 'highway-env'")
+    kind = scenario.view.record[0]["kind"]
+    if sensing.agent and (kind not in (KINEMATICS, TIME_TO_COLLISION) or scenario.glances):
+        raise Unsupported("sensing.agent with observations of that type", "agent = False, or backend = 'highway-env'")
+    if sensing.agent and sensing.ghosts > 0.0 and kind == TIME_TO_COLLISION:
+        raise Unsupported("sensing.ghosts in observed times to collision", "agent = False, or backend = 'highway-env'")
+    if scenario.linear is not None:
+        raise Unsupported("sensing among linear drivers", "backend = 'highway-env'")
+    sensing.sensor(float(scenario.config["dt"][0]))
+    return sensing
 
 
 def _risk_in(shield: str | None, options: Options) -> RiskSettings | None:

@@ -19,8 +19,10 @@ from highway_env.envs.u_turn_env import UTurnEnv
 
 from rss_shield.envs.arguments import number, preset_of, rules_of
 from rss_shield.envs.roads.bicycle import longest_frame
+from rss_shield.envs.sensing import Sensing
 from rss_shield.envs.stock import LOWEST_FREQUENCY, check_frequencies
 from rss_shield.envs.worlds.occluded import OccludedIntersectionEnv
+from rss_shield.envs.worlds.signalised import SignalisedIntersectionEnv
 from rss_shield.envs.worlds.streets import StreetEnv
 from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
 from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
@@ -94,6 +96,7 @@ class Given(TypedDict, total=False):
     replace: str
     judge_params: Params
     judge_rules: Rules | Mapping[str, Any] | None
+    sensing: Sensing | Mapping[str, Any] | None
 
 
 @dataclass(frozen=True)
@@ -123,6 +126,7 @@ class Options:
     replace: str = "frame"
     judge_params: Params = None
     judge_rules: Rules | Mapping[str, Any] | None = None
+    sensing: Sensing | Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         number("intervention_penalty", self.intervention_penalty, 0.0)
@@ -140,6 +144,7 @@ class Options:
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {', '.join(known)}")
 
+        Sensing.of(self.sensing)
         for name in ("measures", "evasion"):
             if not isinstance(getattr(self, name), bool):
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected True or False")
@@ -311,6 +316,18 @@ def check_replace(options: Options, env: Any) -> None:
     if options.replace == "decision" and not isinstance(env.action_type, DiscreteMetaAction):
         kind = type(env.action_type).__name__
         raise ValueError(f"replace = 'decision' with action type {kind}: expected DiscreteMetaAction, or 'frame'")
+
+
+def sensing_in(env: Any, given: Any) -> Sensing | None:
+    """What goes wrong with what a shield sees in an environment; None = nothing."""
+    sensing = Sensing.of(given)
+    if sensing is None:
+        return None
+    if sensing.inflate and scheme_of(env) != LANES:
+        raise ValueError("sensing.inflate = True: expected False where roads cross")
+    if sensing.wrong_light > 0.0 and not isinstance(env, SignalisedIntersectionEnv):
+        raise ValueError(f"sensing.wrong_light = {sensing.wrong_light!r}: expected 0 where there are no lights")
+    return sensing
 
 
 def scheme_of(env: Any) -> int:

@@ -9,16 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.envs.fast.state import OBSTACLE
+from rss_shield.envs.fast.state import OBSTACLE, UNSEEN
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import reach_of, road_through, turned_round
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
+from rss_shield.envs.sensing import age_of
 from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
 from rss_shield.shield.geometry import COS, SIN, is_straight
 from rss_shield.shield.lanes.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
 from rss_shield.shield.lanes.far_pairs import least_margin, own_share
 from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame
+from rss_shield.shield.lanes.inflation import inflate
 from rss_shield.shield.lanes.memory import MEMORY, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, least_cosine, slowed
 
@@ -119,7 +121,7 @@ def car_of(user, episode):
 
 
 @inner
-def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nearest, soonest, within):
+def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nearest, soonest, within, aware=None):
     """Take this frame in, and measure the ego and whoever matters on it in the ego's lane frame.
 
     Who that is stands in `past.near`. The ego's record is in `past.ego`, theirs are in `sight.users`, and those of
@@ -133,6 +135,8 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
       chosen: those who matter are in `past.near` already, the first `episode.near`.
       nearest, soonest: as in `shield.lanes.controller.find_danger`.
       within: whose margin is less than this matters, too [m].
+      aware: `Aware`, whose cars these are, None = these are the cars that are there. Of those who are seen everybody
+        matters.
 
     Returns:
       `shield.lanes.frame.Bend` under the ego.
@@ -153,7 +157,9 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     me.wreck, me.in_own_lane = False, True
     sight.z[0] = np.inf  # gap ahead
     threshold = _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest)
-    if not chosen:
+    if aware is not None:
+        _choose_seen(cars, episode, past, now, before, earlier, aware, dt)
+    elif not chosen:
         far = beyond_doubt(me.speed, settings.table.ego, dt)
         _choose_near(episode, past, sight.x, max(min(threshold, nearest), far, within) + _ROUNDING)
     for a in range(episode.near):
@@ -166,9 +172,55 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
         user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
         if not is_straight(road):
             _note_gap(user.s - me.s, user.y - me.y, box, boxes[0], sight)
-        if past.memory[i].skipped:
+        if aware is not None:
+            _settle(i, k, me, jumps, past.memory[i], sight, episode, aware, settings)
+        if past.memory[i].skipped and (aware is None or jumps):
             _make_up(road_before, before[k], earlier[k], box, dt, sight.users_before[i])
+            if aware is not None:
+                _inflate(k, past.ego[row_before(episode)], sight.users_before[i], episode, aware, settings)
     return look_ahead(road, ego.x, ego.y, ego.speed, ego.length / 2, dt)
+
+
+@inner
+def _choose_seen(cars, episode, past, now, before, earlier, aware, dt):
+    """List whoever is seen, and forget the others. Motion is measured, not how far two measurements are apart."""
+    count = 0
+    for i in range(episode.cars - 1):
+        k = car_of(i, episode)
+        if cars[k].kind == UNSEEN:
+            past.memory[i] = aware.blank[0]
+            continue
+        percept = aware.percepts[k]
+        if percept.since == episode.frames:  # another ghost than on the frame before
+            past.memory[i] = aware.blank[0]
+        before[k].x, before[k].y = now[k].x - percept.vx * dt, now[k].y - percept.vy * dt
+        earlier[k].x, earlier[k].y = before[k].x - percept.vx * dt, before[k].y - percept.vy * dt
+        past.near[count] = i
+        count += 1
+    episode.near = count
+
+
+@inner
+def _settle(i, k, me, jumps, memory, sight, episode, aware, settings):
+    """What is seen of road user `i`, who is car `k`, now and on the frame before."""
+    _inflate(k, me, sight.users[i], episode, aware, settings)
+    if memory.skipped and not jumps:
+        sight.users_before[i] = aware.last[i]
+
+
+@inner
+def _inflate(k, me, user, episode, aware, settings):
+    sensor = aware.sensor
+    if sensor.inflates:
+        inflate(user, me, sensor.accuracy, age_of(aware.percepts[k], episode.frames, sensor), settings.table)
+
+
+@inner
+def keep_seen(episode, past, sight, aware):
+    """Keep what was seen on this frame for the next."""
+    for a in range(episode.near):
+        i = past.near[a]
+        aware.last[i] = sight.users[i]
 
 
 @inner

@@ -14,6 +14,7 @@ TRAFFIC = 0  # `IDMVehicle`
 META = 1  # `MDPVehicle`, driven by meta-actions
 DIRECT = 2  # `Vehicle`, driven by acceleration and steering
 OBSTACLE = 3  # `Obstacle`
+UNSEEN = 4  # somebody there whom a sensor misses; only among cars as they are seen
 
 OBSTACLE_SIZE = 2.0  # [m]
 

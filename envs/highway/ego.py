@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
-from highway_env.vehicle.objects import Landmark
 
+from rss_shield.envs.highway.senses import Senses, others_on
 from rss_shield.envs.options import LANES, OPEN_SPACE, PLANS, Settings
 from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, roads_along, tightest
 from rss_shield.envs.roads.slip import slip_of, steering_of
@@ -24,11 +24,13 @@ from rss_shield.shield.lanes.controller import (
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
+from rss_shield.shield.lanes.inflation import inflate
 from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.tally import (
+    CONTACT,
     COUNTED,
     DECISION_FIELDS,
     EPISODE_FIELDS,
@@ -146,6 +148,7 @@ class ShieldedEgo:
         self.evading = False  # a manoeuvre has begun, and the danger lasts
         self.answers = False  # does a filter that looks once per decision respond in this one?
         self.cruise: float | None = None  # speed to go back to after braking, where the agent has no say in it [m/s]
+        self.senses: Senses | None = None  # what it sees is what is there; else `judge` sees that
         vehicle.act = self.act
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
@@ -170,10 +173,17 @@ class ShieldedEgo:
             spent = perf_counter() - began
             if self.judge is not self:
                 self.judge.watch()
+            if self.senses is not None:
+                self.senses.note(self.others, self.vehicle)
             if self.measured is not None:
                 self.measured.look(self, spent)
             if self.meter is not None:
-                self.meter.look(self)
+                self.meter.look(self.witness)
+
+    @property
+    def witness(self) -> "ShieldedEgo":
+        """Whoever sees what is there."""
+        return self if self.senses is None else self.judge
 
     def watch(self) -> None:
         """Take in a frame on which another shield has decided."""
@@ -269,7 +279,8 @@ class ShieldedEgo:
         """Index in `road.vehicles`; static objects follow after the vehicles."""
         road = self.vehicle.road
         everybody = [*road.vehicles, *road.objects]
-        return next((k for k, other in enumerate(everybody) if other is self.others[i]), -1)
+        who = self.others[i] if self.senses is None else self.others[i].original
+        return next((k for k, other in enumerate(everybody) if other is who), -1)
 
     # -- lane changes
 
@@ -364,6 +375,9 @@ class ShieldedEgo:
         dt = self.settings.table.dt
         to_lane_frame_all(self.branches, poses[:-1], before[:-1], self.boxes[:-1], dt, out[:-1])
         to_lane_frame_all(self.road, poses[-1:], before[-1:], self.boxes[-1:], dt, out[-1:])
+        if self.senses is not None and self.senses.sensor.inflates:
+            for user, age in zip(out[:-1], self.senses.ages, strict=True):
+                inflate(user, out[-1], self.senses.sensor.accuracy, age, self.settings.table)
         return out[:-1], out[-1]
 
     def _go_around(self, users, ego) -> None:
@@ -396,13 +410,14 @@ class ShieldedEgo:
     def _meet(self) -> None:
         """Find out who is on the road, and where."""
         vehicle = self.vehicle
-        road = vehicle.road
-        users = [*road.vehicles, *(o for o in road.objects if not isinstance(o, Landmark))]
-        # who cannot be touched needs no distance
-        others = [v for v in users if v is not vehicle and v.collidable and vehicle.collidable]
+        others = others_on(vehicle.road, vehicle)
+        if self.senses is not None:
+            others = self.senses.look(others, vehicle, int(self.since["frames"]))
         if others != self.others or len(self.before) != len(others) + 1:
             self._follow(others)
         self.poses = np.array([(*v.position, v.heading, v.speed) for v in [*others, vehicle]], dtype=float)
+        if self.senses is not None:  # motion is measured, not how far two measurements are apart
+            self.before[:-1] = self.poses[:-1, :2] - self.senses.motion * self.settings.table.dt
 
     def _follow(self, others: list) -> None:
         """Carry the memory over to a new set of road users, by identity."""
@@ -497,9 +512,13 @@ class ShieldedEgo:
         """
         vehicle = self.vehicle
         if not self.has_contact and (vehicle.crashed or vehicle.impact is not None):
-            self._judge_contact()
+            if self.senses is None:
+                self._judge_contact()
             if self.judge is not self:
                 self.judge.check_contact()
+            if self.senses is not None:
+                for name in CONTACT:
+                    self.since[name] = self.judge.since[name]
         return self.has_contact
 
     def _judge_contact(self) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 from highway_env.envs.lane_keeping_env import LaneKeepingEnv
 
 from rss_shield.envs.arguments import rules_of
@@ -11,6 +12,7 @@ from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.measured import EgoMeter
 from rss_shield.envs.highway.risk import RiskMeter
+from rss_shield.envs.highway.senses import Seen, Senses
 from rss_shield.envs.highway.step import attach, shield_on
 from rss_shield.envs.options import (
     PLANS,
@@ -21,9 +23,11 @@ from rss_shield.envs.options import (
     check_traffic,
     destination_of,
     keeps_speed,
+    sensing_in,
     settings_for,
 )
 from rss_shield.envs.roads.understood import check_roads
+from rss_shield.envs.sensing import mixed
 from rss_shield.shield.filters.answer import RSS, Filter
 from rss_shield.shield.lanes.correction import NEAREST
 
@@ -48,6 +52,8 @@ class EgoShields(gym.Wrapper):
         self.params, self.rules = self.options.params_in(env.unwrapped), rules_of(self.options.rules)
         self.judge = self.options.judge_in(env.unwrapped)
         self.risk = check_risk(self.options.risk)
+        self.sensing = sensing_in(env.unwrapped, self.options.sensing)
+        self._take_seed(None)
         inner: gym.Env = env
         while isinstance(inner, gym.Wrapper):
             if isinstance(inner, EgoShields):
@@ -80,9 +86,16 @@ class EgoShields(gym.Wrapper):
         conduct = self.options.conduct
         return settings_for(self.env.unwrapped, *self.judge, "monitor", conduct) if self.judge else None
 
+    def _take_seed(self, seed: int | None) -> None:
+        """Errors of sensing begin anew with a seed; without one they go on."""
+        if self.sensing is not None and (seed is not None or not hasattr(self, "_key")):
+            self._key, self._episode = self.sensing.keys(seed), -1
+
     def _begin(self) -> None:
         """Put new shields on for a new episode."""
         self._check()
+        if self.sensing is not None:
+            self._episode += 1
         self._settings, self._judge = self._current_settings(), self._judge_settings()
         env: Any = self.env.unwrapped
         if not isinstance(env, LaneKeepingEnv):  # nobody else is on its lanes, which do not meet
@@ -119,7 +132,8 @@ class EgoShields(gym.Wrapper):
         shield = shield_on(vehicle)
         if shield is None or not shield.is_ego:
             among = self.options.traffic == "compliant"
-            shield = attach(vehicle, self._settings, self.options.record, destination_of(env) or "", among, self._judge)
+            own = self._settings, self.options.record, destination_of(env) or "", among, self._judge
+            shield = attach(vehicle, *own, self._senses(i))
             shield.is_ego = True
             kinds = getattr(env.action_type, "agents_action_types", [env.action_type])
             if self._settings.overrides and i < len(kinds) and keeps_speed(env, kinds[i]):
@@ -137,6 +151,23 @@ class EgoShields(gym.Wrapper):
                 "around an environment, and a reset after a change of its configuration"
             )
         return shield
+
+    def _senses(self, i: int) -> Senses | None:
+        """Sensors of an ego."""
+        if self.sensing is None:
+            return None
+        sensor = self.sensing.sensor(self._settings.table.dt)
+        episode = np.uint64(mixed(self._key, self._episode))
+        return Senses(sensor, np.uint64(mixed(episode, i)), self.options.record)
+
+    def _sensed(self, observation: Any) -> Any:
+        """What an agent observes, if that is what is sensed."""
+        if self.sensing is None or not self.sensing.agent:
+            return observation
+        env: Any = self.env.unwrapped
+        (ego,) = self._egos
+        with Seen(env, ego.senses, ego.vehicle, int(ego.since["frames"])):
+            return env.observation_type.observe()
 
     def _guard_after_step(self, egos: list[ShieldedEgo]) -> list[ShieldedEgo]:
         """Those who were egos during a step, or if another wrapper has begun a new episode instead, the new ones.

@@ -14,6 +14,7 @@ from rss_shield.envs.highway.free_ego import FreeEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.highway.open_ego import OpenSpaceEgo
 from rss_shield.envs.highway.people_ego import PeopleEgo
+from rss_shield.envs.highway.senses import Senses
 from rss_shield.envs.highway.sliding_ego import SlidingEgo
 from rss_shield.envs.options import LANES, OPEN_SPACE, Options, Settings
 from rss_shield.envs.worlds.walkers import Watched
@@ -29,6 +30,7 @@ def attach(
     destination: str = "",
     takes_turns: bool = False,
     judge: Settings | None = None,
+    senses: Senses | None = None,
 ) -> ShieldedEgo:
     """Put a shield on a vehicle.
 
@@ -38,11 +40,14 @@ def attach(
       destination: where a car goes that is steered freely and has no route; needed where roads cross.
       takes_turns: it is among compliant drivers.
       judge: what it is judged by, where that is not what it is restricted by.
+      senses: what it sees, where that is not what is there; the judge sees that.
     """
+    if senses is not None and judge is None:
+        judge = settings
     if judge is not None:  # first, because the shield that acts is the one that was attached last
         watching = attach(vehicle, judge._replace(overrides=False), record, destination)
         ego = attach(vehicle, settings, record, destination, takes_turns)
-        ego.judge = watching
+        ego.judge, ego.senses = watching, senses
         return ego
     if settings.scheme == LANES:
         return (SlidingEgo if isinstance(vehicle, BicycleVehicle) else ShieldedEgo)(vehicle, settings, record)

@@ -146,7 +146,7 @@ def find_danger(
         pair = assess(ego, user, table)
         remember(memory[i], pair, ego, user, dt)
         bounds = merge(bounds, memory[i], table.ego, rules, dt)
-        if rules.limits and not may_back_up(memory[i], pair):
+        if rules.limits and (not may_back_up(memory[i], pair) or (user.vague and memory[i].since > 0)):
             bounds = _hold(bounds, held)
         if memory[i].since == 0 and rules.anticipation > 0.0:
             if pair.safe_lon and not pair.safe_lat:

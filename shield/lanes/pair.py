@@ -26,6 +26,7 @@ ROAD_USER = np.dtype(
         ("half_width", "f8"),
         ("in_own_lane", "?"),  # drives in a lane meant for its direction
         ("wreck", "?"),  # has crashed, or never moves: it may stop on the spot
+        ("vague", "?"),  # the worst of where it may be (`inflation`): what made it safe before may be either axis
     ],
     align=True,
 )
