@@ -23,8 +23,8 @@ def make(env_id: str, shield: str | None = "override", params: Params = None, **
       params: the table in force, see `ShieldWrapper`.
       kwargs: the other options of a shield: `rules`, `intervention_penalty`, `penalty_on`, `record`, `entry`, `intent`,
         `waiting`, `traffic`, `examine`, `risk`, `measures`, `filter`, `filter_at`, `correction`, `evasion`,
-        `replace`, `judge_params`, `judge_rules`, `sensing`, see `ShieldWrapper`. The rest is passed to
-        `gymnasium.make`, e.g.
+        `replace`, `judge_params`, `judge_rules`, `sensing`, `conditions`, `classes`, see `ShieldWrapper`. The rest
+        is passed to `gymnasium.make`, e.g.
         `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:
@@ -38,8 +38,10 @@ def make(env_id: str, shield: str | None = "override", params: Params = None, **
         raise ValueError(f"traffic = {options.traffic!r}: expected 'stock' without a shield; use shield = 'monitor'")
     if shield is None and options.risk:
         raise ValueError(f"risk = {options.risk!r}: expected False without a shield; use shield = 'monitor'")
-    if shield is None and options.sensing is not None:
-        raise ValueError(f"sensing = {options.sensing!r}: expected None without a shield; use shield = 'monitor'")
+    for name in ("sensing", "conditions", "classes"):
+        if shield is None and getattr(options, name) is not None:
+            given_as = f"{name} = {getattr(options, name)!r}"
+            raise ValueError(f"{given_as}: expected None without a shield; use shield = 'monitor'")
     try:
         env = make_stock(env_id, **rest)
     except gym.error.Error as error:

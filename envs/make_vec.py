@@ -26,12 +26,15 @@ from rss_shield.envs.options import (
     check_environment,
     check_replace,
     check_risk,
+    ground_in,
+    on_ground,
     scheme_of,
     sensing_in,
     settings_for,
     split,
 )
 from rss_shield.envs.sensing import Sensing
+from rss_shield.shield.ground import Ground
 from rss_shield.shield.risk import RiskSettings
 
 BACKENDS = ("fast", "highway-env")
@@ -67,8 +70,8 @@ def make_vec(
         of single environments around each where the backend is "highway-env".
       kwargs: `max_episode_steps`; `render_mode` (the engine knows "rgb_array"); `rules`, `intervention_penalty`,
         `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `evasion`,
-        `replace`, `risk` and, along lanes, `sensing` of `ShieldWrapper`; and whatever else `make` takes (`traffic`,
-        `judge_params`, ...) where the backend is "highway-env".
+        `replace`, `risk`, `conditions`, `classes` and, along lanes, `sensing` of `ShieldWrapper`; and whatever else
+        `make` takes (`traffic`, `judge_params`, ...) where the backend is "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.
@@ -118,8 +121,11 @@ def _in_engine(
     settings = _settings_in(scenario.stock, shield, options) if shield is not None else None
     penalty, by_change = float(options.intervention_penalty), options.penalty_on == "change"
     replaces, risk = shield is not None and options.replace == "decision", _risk_in(shield, options)
+    ground = _ground_in(scenario, settings, options)
+    if settings is not None:
+        settings = on_ground(settings, ground)
     rules = settings, penalty, autoreset_mode, threads, by_change, replaces, risk, rest.get("render_mode")
-    return FastVectorEnv(scenario, num_envs, *rules, _sensing_in(scenario, shield, options))
+    return FastVectorEnv(scenario, num_envs, *rules, _sensing_in(scenario, shield, options), ground)
 
 
 def _is_for_batches(wrapper: Any) -> bool:
@@ -146,6 +152,16 @@ def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
         kind = type(stock.action_type).__name__
         raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
     return settings
+
+
+def _ground_in(scenario: Scenario, settings: Settings | None, options: Options) -> Ground | None:
+    """Conditions of the road and classes of vehicles."""
+    if settings is not None:
+        return ground_in(scenario.stock, settings, options.conditions, options.classes)
+    for name in ("conditions", "classes"):
+        if getattr(options, name) is not None:
+            raise ValueError(f"{name} = {getattr(options, name)!r}: expected None without a shield; use 'monitor'")
+    return None
 
 
 def _sensing_in(scenario: Scenario, shield: str | None, options: Options) -> Sensing | None:

@@ -13,6 +13,7 @@ import numpy as np
 from numba import typeof
 
 from rss_shield.envs.compiled import kernel, unfolded
+from rss_shield.envs.conditions import group_of, held
 from rss_shield.envs.decisions.foresight import without_anticipation
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.draws import load_generator
@@ -52,6 +53,7 @@ from rss_shield.envs.roads.network import Network
 from rss_shield.envs.sensing import Sensing
 from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, rare
 from rss_shield.shield.comfort import RIDE
+from rss_shield.shield.ground import Ground
 from rss_shield.shield.junctions.controller import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
 from rss_shield.shield.risk import RiskSettings
@@ -82,6 +84,7 @@ class World(NamedTuple):
     lane_odds: np.ndarray
     linear: np.ndarray | None  # `[6]` as in `linear_drivers`, where the traffic is of that kind
     field: Field | None  # of the measure of risk, where somebody asked for it
+    ground: Ground | None  # where not all of it, or not everybody on it, is alike
 
 
 class Batch(NamedTuple):
@@ -135,6 +138,26 @@ def _populate(cars, episode, order, world, sight, flow):
         make_scene(cars, episode, order, net, net.lanes, config, world.target_speeds, world.lane_odds, linear)
     else:
         open_intersection(cars, episode, order, net, sight, config, flow, world.target_speeds, linear)
+    _draw_groups(cars, episode, world.ground)
+
+
+@inner
+def _draw_groups(cars, episode, ground):
+    """Vehicle classes; the ego is a car."""
+    if ground is not None:
+        for i in range(episode.vehicles):
+            cars[i].group = group_of(episode.state_low, i, ground.shares)
+        cars[episode.ego].group = 0
+
+
+@inner
+def _hold(cars, episode, ground):
+    """Everybody does what tyres and brakes admit."""
+    if ground is not None:
+        for i in range(episode.vehicles):
+            car = cars[i]
+            group = -1 if i == episode.ego else car.group
+            car.acceleration = held(car.acceleration, ground, car.x, group)
 
 
 @inner
@@ -242,6 +265,7 @@ def _advance(
                     cars, episode, changing, net, sight, distances, plans, ride, meter, watch, settings, step, aware
                 )
             first, last = last, episode.vehicles
+        _hold(cars, episode, world.ground)
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
             for i in range(len(cars)):
@@ -370,6 +394,7 @@ class Engine:
       by_change: the penalty is times the mean change of acceleration instead [m/s^2].
       risk: settings of the measure of risk around each ego, None = nobody asked; it needs a shield.
       sensing: what goes wrong with what an ego sees, None = nothing; it needs a shield that keeps distances.
+      ground: conditions of the road and classes of vehicles, None = dry, and cars; it needs a shield, too.
     """
 
     def __init__(
@@ -383,6 +408,7 @@ class Engine:
         by_change: bool = False,
         risk: RiskSettings | None = None,
         sensing: Sensing | None = None,
+        ground: Ground | None = None,
     ) -> None:
         n = scenario.capacity
         self.scenario = scenario
@@ -397,7 +423,7 @@ class Engine:
             ways = compile_ways(network, net, float(scenario.config["dt"][0]))
             crossings = np.zeros((num_envs, n), CROSSING)
         elif settings is not None:
-            frames = compile_lane_frames(network, settings)
+            frames = compile_lane_frames(network, settings, ground)
             past = make_past(num_envs, seen)
         self.world = World(
             scenario.config,
@@ -411,6 +437,7 @@ class Engine:
             scenario.lane_odds,
             scenario.linear,
             None if risk is None else compile_field(network, risk, self.settings),
+            ground,
         )
         self.batch = Batch(
             np.zeros((num_envs, n), CAR if scenario.linear is None else LINEAR_CAR),

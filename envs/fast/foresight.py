@@ -14,7 +14,7 @@ from rss_shield.envs.decisions.masks import allow
 from rss_shield.envs.fast.drivers import take_meta_action
 from rss_shield.envs.fast.frame import survey
 from rss_shield.envs.fast.guard import Plans, is_refused, scene_of
-from rss_shield.envs.fast.neighbours import Distances, Past, make_past, measure, row_before
+from rss_shield.envs.fast.neighbours import Distances, Past, make_past, measure, row_before, stand_on
 from rss_shield.envs.fast.senses import GHOSTS, aware_of, look
 from rss_shield.envs.fast.sight import project
 from rss_shield.envs.fast.state import EPISODE
@@ -120,6 +120,7 @@ def _foresee_on_lanes(e, cars, episode, sight, desk, world, batch, watch, settin
     desk.episode[0] = episode
     copy, car = desk.episode[0], cars[episode.ego]
     distances, near = Distances(world.frames, past), _margin_that_matters(cars, episode, config, settings)
+    settings = stand_on(cars, copy, world.frames.ground, past.memory, settings)
     limits = False, -np.inf, -np.inf, near
     bend = measure(cars, copy, lanes, sight, distances, watch.boxes, settings, *limits, aware)
     me = past.ego[copy.turn]

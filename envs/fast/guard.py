@@ -10,7 +10,16 @@ import numpy as np
 
 from rss_shield.envs._numpy.floats import norm
 from rss_shield.envs.fast.collisions import is_near, overlap
-from rss_shield.envs.fast.neighbours import Distances, Past, car_of, keep_seen, measure, row_before, start_past
+from rss_shield.envs.fast.neighbours import (
+    Distances,
+    Past,
+    car_of,
+    keep_seen,
+    measure,
+    row_before,
+    stand_on,
+    start_past,
+)
 from rss_shield.envs.fast.risk import look_at_risk
 from rss_shield.envs.fast.senses import GHOSTS, follow, look, start_senses
 from rss_shield.envs.fast.sight import project
@@ -237,6 +246,7 @@ def start_judging(aware):
 def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step, aware):
     """Defs. 1-10, along the lane of the ego."""
     car, past = cars[episode.ego], distances.past
+    settings = stand_on(cars, episode, distances.frames.ground, past.memory, settings)
     if car.kind == DIRECT:
         acceleration, steering = episode.nominal_acceleration, episode.nominal_steering
     else:
@@ -542,6 +552,7 @@ def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
     count, heaviest = _list_partners(cars, episode, sight, settings.table.dt), -1
     if distances is not None:
         episode.near, past = count, distances.past
+        settings = stand_on(cars, episode, distances.frames.ground, past.memory, settings)
         for a in range(count):
             past.near[a] = sight.some[a]
         measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf, -np.inf)

@@ -15,6 +15,7 @@ from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
+from rss_shield.shield.ground import STATES, Ground, state_along, table_on, worse_of
 from rss_shield.shield.lanes.controller import (
     Body,
     Response,
@@ -27,7 +28,7 @@ from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_
 from rss_shield.shield.lanes.inflation import inflate
 from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
-from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe
+from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, start_over
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.tally import (
     CONTACT,
@@ -116,7 +117,10 @@ class ShieldedEgo:
 
     def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
         self.vehicle = vehicle
-        self.settings = settings
+        self.settings = self.given = settings
+        self.ground: Ground | None = None  # where not all of the road, or not everybody on it, is alike
+        self.stands = -1  # state of the road that the ego's parameters are for
+        self.kinds = np.zeros(0, np.int64)  # `[N]` rows of parameters of the others
         self.body = (vehicle.LENGTH / 2, MAX_SLIP)
         self.backs_up = not isinstance(vehicle, ControlledVehicle)  # drivers that keep a speed never ask for it
         self.nominal = dict(vehicle.action)
@@ -191,11 +195,12 @@ class ShieldedEgo:
         self._frame()
 
     def _frame(self) -> None:
-        vehicle, settings = self.vehicle, self.settings
+        vehicle = self.vehicle
         # meta-actions compute a new command on every frame, a continuous one persists
         nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
         steering = float(nominal["steering"])  # single precision where the agent's action is
         self._meet()
+        settings = self.settings  # of this place
         users, ego, bend = self._sense()
         wish = self._command(self._throttle(nominal), steering)
         danger = find_danger(ego, users, *self.last, self.memory, settings.table)
@@ -372,6 +377,8 @@ class ShieldedEgo:
         out = np.zeros(len(poses), ROAD_USER)
         out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in self.others]
         out["in_own_lane"] = [self._in_own_lane(v) for v in [*self.others, self.vehicle]]
+        if self.ground is not None:
+            out["kind"][:-1] = self.kinds
         dt = self.settings.table.dt
         to_lane_frame_all(self.branches, poses[:-1], before[:-1], self.boxes[:-1], dt, out[:-1])
         to_lane_frame_all(self.road, poses[-1:], before[-1:], self.boxes[-1:], dt, out[-1:])
@@ -418,6 +425,32 @@ class ShieldedEgo:
         self.poses = np.array([(*v.position, v.heading, v.speed) for v in [*others, vehicle]], dtype=float)
         if self.senses is not None:  # motion is measured, not how far two measurements are apart
             self.before[:-1] = self.poses[:-1, :2] - self.senses.motion * self.settings.table.dt
+        if self.ground is not None:
+            self._stand_on(self.ground)
+
+    def _stand_on(self, ground: Ground) -> None:
+        """Which parameters count where everybody is. While danger lasts, the road does not get better for the ego."""
+        along = np.column_stack([self.poses[:, 0], np.cos(self.poses[:, 2]), self.poses[:, 3]])
+        first = [STATES * getattr(v, "rss_group", 0) for v in self.others]
+        self.kinds = np.array(
+            [
+                row + state_along(ground, ground.other, row, *map(float, place), v.LENGTH / 2)
+                for row, place, v in zip(first, along[:-1], self.others, strict=True)
+            ],
+            np.int64,
+        )
+        state = state_along(ground, ground.ego, 0, *map(float, along[-1]), self.vehicle.LENGTH / 2)
+        if self.stands >= 0 and (self.memory["since"] > 0).any():
+            state = worse_of(state, self.stands)
+        moved_on = self.stands >= 0 and state != self.stands
+        ego_before, users_before = self.last
+        for memory, other in zip(self.memory, self.kinds != users_before["kind"], strict=True):
+            if other or moved_on:
+                start_over(memory)
+        users_before = users_before.copy()
+        users_before["kind"] = self.kinds
+        self.last, self.stands = (ego_before, users_before), state
+        self.settings = self.settings._replace(table=table_on(self.settings.table, ground, state))
 
     def _follow(self, others: list) -> None:
         """Carry the memory over to a new set of road users, by identity."""

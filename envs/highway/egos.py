@@ -10,6 +10,7 @@ from highway_env.envs.lane_keeping_env import LaneKeepingEnv
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.highway.drivers import drivers_on, shield_everybody
 from rss_shield.envs.highway.ego import ShieldedEgo
+from rss_shield.envs.highway.grip import draw_groups, hold_everybody
 from rss_shield.envs.highway.measured import EgoMeter
 from rss_shield.envs.highway.risk import RiskMeter
 from rss_shield.envs.highway.senses import Seen, Senses
@@ -22,13 +23,16 @@ from rss_shield.envs.options import (
     check_risk,
     check_traffic,
     destination_of,
+    ground_in,
     keeps_speed,
+    on_ground,
     sensing_in,
     settings_for,
 )
 from rss_shield.envs.roads.understood import check_roads
 from rss_shield.envs.sensing import mixed
 from rss_shield.shield.filters.answer import RSS, Filter
+from rss_shield.shield.ground import Ground
 from rss_shield.shield.lanes.correction import NEAREST
 
 
@@ -41,6 +45,8 @@ class EgoShields(gym.Wrapper):
 
     _settings: Settings
     _judge: Settings | None  # what the egos are judged by, where that is not what they are restricted by
+    _ground: Ground | None = None  # what they drive on, where not all of it is alike, by their own table
+    _ground_of_judge: Ground | None = None  # and by the judge's
     _egos: list[ShieldedEgo]  # shields of the last step, in the order of the vehicles
 
     def __init__(self, env: gym.Env, mode: str, given: Mapping[str, Any]) -> None:
@@ -78,13 +84,22 @@ class EgoShields(gym.Wrapper):
         raise NotImplementedError
 
     def _current_settings(self) -> Settings:
-        """Settings for the environment as it is now."""
-        return settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.options.conduct)
+        """Settings for the environment as it is now, and the ground."""
+        settings = settings_for(self.env.unwrapped, self.params, self.rules, self.mode, self.options.conduct)
+        self._ground = self._ground_by(settings)
+        return on_ground(settings, self._ground)
 
     def _judge_settings(self) -> Settings | None:
         """What the egos are judged by, where that is not what they are restricted by."""
-        conduct = self.options.conduct
-        return settings_for(self.env.unwrapped, *self.judge, "monitor", conduct) if self.judge else None
+        if not self.judge:
+            return None
+        settings = settings_for(self.env.unwrapped, *self.judge, "monitor", self.options.conduct)
+        self._ground_of_judge = self._ground_by(settings)
+        return on_ground(settings, self._ground_of_judge)
+
+    def _ground_by(self, settings: Settings) -> Ground | None:
+        """The ground as a table has it."""
+        return ground_in(self.env.unwrapped, settings, self.options.conditions, self.options.classes)
 
     def _take_seed(self, seed: int | None) -> None:
         """Errors of sensing begin anew with a seed; without one they go on."""
@@ -100,6 +115,8 @@ class EgoShields(gym.Wrapper):
         env: Any = self.env.unwrapped
         if not isinstance(env, LaneKeepingEnv):  # nobody else is on its lanes, which do not meet
             check_roads(env.road.network, self._settings.scheme == PLANS)
+        if self._ground is not None:
+            draw_groups(env, self._ground)
         for shield in list(egos_on(env)):
             _take_off(shield)
         self._egos = []
@@ -120,7 +137,10 @@ class EgoShields(gym.Wrapper):
             if shield not in self._egos:
                 _take_off(shield)
         if self.options.traffic == "compliant":
-            shield_everybody(env.road, self._settings._replace(filter=Filter(RSS), correction=NEAREST))
+            conduct = self._settings._replace(filter=Filter(RSS), correction=NEAREST)
+            shield_everybody(env.road, conduct, self._ground)
+        if self._ground is not None:
+            hold_everybody(env, self._ground)
         return self._egos
 
     def _shield_of(self, i: int, vehicle: Any) -> ShieldedEgo:
@@ -133,7 +153,8 @@ class EgoShields(gym.Wrapper):
         if shield is None or not shield.is_ego:
             among = self.options.traffic == "compliant"
             own = self._settings, self.options.record, destination_of(env) or "", among, self._judge
-            shield = attach(vehicle, *own, self._senses(i))
+            grounds = self._ground, self._ground_of_judge
+            shield = attach(vehicle, *own, self._senses(i), grounds)
             shield.is_ego = True
             kinds = getattr(env.action_type, "agents_action_types", [env.action_type])
             if self._settings.overrides and i < len(kinds) and keeps_speed(env, kinds[i]):
@@ -145,7 +166,7 @@ class EgoShields(gym.Wrapper):
                 shield.judge.had_contact_before()
             if env.time > 0.0 and i < len(self._egos):
                 shield.go_on_from(self._egos[i])
-        elif shield.settings != self._settings:
+        elif shield.given != self._settings:
             raise ValueError(
                 f"controlled_vehicles[{i}] = {vehicle} is behind a shield with other settings: expected one shield "
                 "around an environment, and a reset after a change of its configuration"

@@ -108,6 +108,11 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
       sensing: what goes wrong between the world and the shield, `rss_shield.envs.sensing.Sensing` or a dict of its
         fields; None = it sees what is there. The judge always does, and what is measured is measured there; margins,
         times to collision, comfort and `partner` are the shield's own.
+      conditions: of the road: "dry", "wet", "snow" or "ice", or along lanes a dict (from, to) -> one of these, in x
+        [m]; what nobody names is dry. Everybody is held to the grip there, and to the parameters that hold where it
+        will be.
+      classes: kinds of vehicles among the others, as shares: "motorcycle", "truck", "bus"; the rest are cars. Each has
+        parameters of its own (`rss_shield.shield.ground.CLASSES`). Along lanes.
 
     Raises:
       ValueError: unsupported environment, action type or mode; bad parameters; a response time

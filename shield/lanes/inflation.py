@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield.ground import table_of
 from rss_shield.shield.lanes.pair import assess
 
 LARGEST_ACROSS = 0.9  # error across the lane up to which a side is known [m]
@@ -89,7 +90,7 @@ def inflate(user, ego, accuracy, age, table):
       age: of the measurement [s].
       table: `Table` in force.
     """
-    spread = spread_of(user, accuracy, age, table.other)
+    spread = spread_of(user, accuracy, age, table_of(table, user).other)
     side = 1.0 if user.y >= ego.y else -1.0
     committed = max(accuracy.heading - side * user.sin, 0.0)
     fastest = abs(user.speed) + spread.speed

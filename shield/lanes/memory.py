@@ -169,6 +169,17 @@ def forget_safe(memory):
 
 
 @compiled
+def start_over(memory):
+    """Other parameters count for a pair from here on, in place: what distances these require is nobody's doing.
+
+    Safety is found out again by them (`forget_safe`), and a danger that lasts is inherited.
+    """
+    forget_safe(memory)
+    if memory.since > 0:
+        memory.axes = NEITHER
+
+
+@compiled
 def owes(memory, axis):
     """Does this pair owe a response on `axis` now? Danger from the start is answered on both."""
     return memory.since > 0 and (memory.axes == NEITHER or (memory.axes & axis) != 0)
