@@ -119,10 +119,10 @@ def episodes_part(config: Config) -> str:
             rows.append(row(name, "compliant", play(compliant, config.compliant, "highway-env")))
             print(*rows[-1], sep=" | ", flush=True)
     words = (
-        "Stock drivers keep their distances whatever the road is like, so on ice they run into each other and into the "
-        "ego; compliant ones go by the same table. *Broken / in danger*: pair-frames on which the ego broke a duty, of "
-        "those in danger. Means with 95 % intervals of the bootstrap over episodes, shares at fault with those of "
-        "Clopper and Pearson."
+        "Stock drivers keep their distances whatever the road is like, but do no more than its grip admits; compliant "
+        "ones, where they are played, go by the same table. *Broken / in danger*: pair-frames on which the ego broke a "
+        "duty, of those in danger. Means with 95 % intervals of the bootstrap over episodes, shares at fault with "
+        "those of Clopper and Pearson."
     )
     return "\n\n".join(["## Episodes", words, markdown(rows)])
 

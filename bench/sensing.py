@@ -66,6 +66,11 @@ class Point(NamedTuple):
     def at_fault(self) -> int:
         return int(self.played["blame"].isin(AT_FAULT).sum())
 
+    @property
+    def broken(self) -> tuple[int, int]:
+        """Pair-frames in danger on which the ego broke a duty, and all of them."""
+        return int(self.played["broken_duties"].sum()), int(self.played["dangerous_pairs"].sum())
+
 
 ARMS: dict[str, dict[str, Any]] = {"as seen": {}, "inflated": {"inflate": True}, "2 of 3": {"subsystems": 3}}
 
@@ -78,15 +83,16 @@ def noise(level: float) -> dict[str, Any]:
 
 MODERATE = {**noise(0.5), "misses": 0.1, "miss_duration": 0.2, "latency": 0.2}
 SWEEPS: dict[str, dict[float, tuple[dict[str, Any], tuple[str, ...]]]] = {
-    "noise": {level: (noise(level), ("as seen", "inflated")) for level in (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)},
-    "misses": {share: ({"misses": share, "miss_duration": 0.4}, tuple(ARMS)) for share in (0.0, 0.05, 0.1, 0.2, 0.4)},
-    "latency": {age: ({"latency": age}, ("as seen", "inflated")) for age in (0.0, 0.2, 0.4, 0.6, 0.8)},
-    "excess": {
-        times: ({**MODERATE, "excess": times}, ("as seen", "inflated")) for times in (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
+    "noise": {level: (noise(level), ("as seen", "inflated")) for level in (0.0, 0.5, 1.0, 2.0, 4.0)},
+    "misses": {share: ({"misses": share, "miss_duration": 0.4}, tuple(ARMS)) for share in (0.1, 0.2, 0.4)},
+    "latency": {age: ({"latency": age}, ("as seen", "inflated")) for age in (0.2, 0.4, 0.8)},
+    "response": {
+        rho: ({"latency": 0.4, "response_time": rho}, ("as seen", "inflated")) for rho in (0.2, 0.4, 0.6, 0.8)
     },
-    "ghosts": {share: ({"ghosts": share}, ("as seen",)) for share in (0.0, 0.05, 0.2)},
-    "wrong lane": {share: ({"wrong_lane": share}, ("as seen", "2 of 3")) for share in (0.0, 0.02, 0.1)},
-    "range": {metres: ({"range": metres}, ("as seen",)) for metres in (200.0, 80.0, 40.0, 20.0)},
+    "excess": {times: ({**MODERATE, "excess": times}, ("as seen", "inflated")) for times in (1.0, 2.0, 4.0, 6.0)},
+    "ghosts": {0.2: ({"ghosts": 0.2}, ("as seen",))},
+    "wrong lane": {0.1: ({"wrong_lane": 0.1}, ("as seen", "2 of 3"))},
+    "range": {metres: ({"range": metres}, ("as seen",)) for metres in (40.0, 20.0, 10.0)},
 }
 WORDS = {
     "noise": (
@@ -106,6 +112,12 @@ WORDS = {
         "age [s]",
         "Inflation moves on what it has seen, and counts on what drivers may have done since.",
     ),
+    "response": (
+        "Response time",
+        "response time of the ego [s]",
+        "A latency of 0.4 s. Drivers of highway-env change lanes more briskly than the table admits; what the ego can "
+        "know of it only later it answers in time if the response time that it is held to contains that.",
+    ),
     "excess": (
         "Where it ends",
         "times worse than said",
@@ -123,13 +135,21 @@ WORDS = {
 
 
 def play(sensing: dict[str, Any], episodes: int) -> pd.DataFrame:
-    """One row per episode, see `rss_shield.eval.rollout.run_episode`."""
+    """One row per episode, see `rss_shield.eval.rollout.run_episode`.
+
+    Args:
+      sensing: fields of `Sensing`; "response_time" is that of the ego instead [s].
+      episodes: how many.
+    """
 
     def act(observations: np.ndarray) -> np.ndarray:
         return np.full(len(observations), FASTER)
 
+    errors = {name: value for name, value in sensing.items() if name != "response_time"}
+    params = {"ego": {"response_time": sensing["response_time"]}} if "response_time" in sensing else None
+
     def build(count: int) -> Any:
-        return make_vec(ENV, count, sensing=sensing, autoreset_mode=AutoresetMode.DISABLED)
+        return make_vec(ENV, count, params=params, sensing=errors, autoreset_mode=AutoresetMode.DISABLED)
 
     seeds = range(FIRST_SEED, FIRST_SEED + episodes)
     return evaluate(build, act, seeds, n_envs=min(episodes, AT_ONCE), keep_actions=False)
@@ -141,7 +161,10 @@ def sweep_all(episodes: int) -> list[Point]:
         for level, (sensing, arms) in levels.items():
             for arm in arms:
                 point = Point(sweep, level, arm, play(sensing | ARMS[arm], episodes))
-                print(f"{sweep} {level:g}, {arm}: {point.at_fault} of {episodes} at fault", flush=True)
+                print(
+                    f"{sweep} {level:g}, {arm}: {point.at_fault} of {episodes} at fault, {point.broken} broken",
+                    flush=True,
+                )
                 found.append(point)
     return found
 
@@ -164,7 +187,7 @@ def sweep_part(sweep: str, points: list[Point]) -> str:
                 n,
                 percent(int(played["crashed"].sum()), n),
                 percent(point.at_fault, n),
-                f"{spaced(int(played['broken_duties'].sum()))} / {spaced(int(played['dangerous_pairs'].sum()))}",
+                " / ".join(map(spaced, point.broken)),
                 f"{earned.value:.1f} [{earned.low:.1f}, {earned.high:.1f}]",
                 f"{100 * played['override_share'].mean():.0f} %",
             )
@@ -173,27 +196,29 @@ def sweep_part(sweep: str, points: list[Point]) -> str:
 
 
 def plot(points: list[Point], path: Path) -> None:
-    """Share of episodes at fault against each kind of error."""
+    """Share of the dangerous pair-frames with a broken duty, and of episodes at fault, against each kind of error."""
     looks = {"as seen": ("#D55E00", "o", "-"), "inflated": ("#0072B2", "s", "--"), "2 of 3": ("#009E73", "^", ":")}
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8.5, 2.6))
-        panels = figure.subplots(1, 4, sharey=True)
-        for axes, sweep in zip(panels, ("noise", "misses", "latency", "excess"), strict=True):
+        figure = Figure(figsize=(8.5, 4.2))
+        panels = figure.subplots(2, 4, sharey="row")
+        for column, sweep in enumerate(("noise", "misses", "response", "excess")):
             title, unit, _ = WORDS[sweep]
             for arm, (colour, marker, style) in looks.items():
                 line = [point for point in points if (point.sweep, point.arm) == (sweep, arm)]
                 if not line:
                     continue
-                rates = [clopper_pearson(point.at_fault, len(point.played)) for point in line]
-                x, values = [point.level for point in line], np.array([rate.value for rate in rates])
-                spread = np.array([(rate.value - rate.low, rate.high - rate.value) for rate in rates]).T
                 look = {"color": colour, "marker": marker, "ls": style, "ms": 4, "label": arm}
-                axes.errorbar(x, values, np.maximum(spread, 0.0), **look)
-            axes.set_title(title, loc="left")
-            axes.set_xlabel(unit)
-        panels[0].yaxis.set_major_formatter(PercentFormatter(1.0))
-        panels[0].set_ylabel("episodes at fault")
-        figure.legend(*panels[1].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+                x = [point.level for point in line]
+                panels[0, column].plot(x, [point.broken[0] / max(point.broken[1], 1) for point in line], **look)
+                rates = [clopper_pearson(point.at_fault, len(point.played)) for point in line]
+                spread = np.array([(rate.value - rate.low, rate.high - rate.value) for rate in rates]).T
+                panels[1, column].errorbar(x, [rate.value for rate in rates], np.maximum(spread, 0.0), **look)
+            panels[0, column].set_title(title, loc="left")
+            panels[1, column].set_xlabel(unit)
+        for row, name in enumerate(("duties broken", "episodes at fault")):
+            panels[row, 0].yaxis.set_major_formatter(PercentFormatter(1.0))
+            panels[row, 0].set_ylabel(name)
+        figure.legend(*panels[0, 1].get_legend_handles_labels(), loc="outside upper center", ncols=3)
         with atomic(path) as temporary:
             figure.savefig(temporary, format="png", dpi=130)
 
@@ -249,7 +274,7 @@ def pac_part(episodes: int) -> str:
     for name, sensing in (
         ("noise 0.5 m", noise(0.5)),
         ("noise 2 m", noise(2.0)),
-        ("misses 10 %", {"misses": 0.2, "miss_duration": 0.2}),
+        ("misses 20 %", {"misses": 0.2, "miss_duration": 0.2}),
         ("ghosts 20 %", {"ghosts": 0.2}),
         ("wrong lane 10 %", {"wrong_lane": 0.1}),
         ("latency 0.4 s", {"latency": 0.4}),
@@ -296,22 +321,25 @@ def redundancy_part(decisions: int) -> str:
 
 
 def summary(points: list[Point]) -> str:
-    def at(sweep: str, arm: str, most: float = np.inf) -> tuple[int, int]:
-        chosen = [p for p in points if (p.sweep, p.arm) == (sweep, arm) and p.level <= most]
-        return sum(p.at_fault for p in chosen), sum(len(p.played) for p in chosen)
-
-    lines = []
-    for sweep in ("noise", "misses", "latency"):
-        seen, inflated = at(sweep, "as seen"), at(sweep, "inflated")
-        lines.append(
-            f"{WORDS[sweep][0]}: inflated {percent(*inflated)} of {spaced(inflated[1])} episodes end by the ego's "
-            f"fault, all levels together; as seen {percent(*seen)}."
+    def said(sweep: str, arm: str, least: float = 0.0, most: float = np.inf) -> str:
+        chosen = [p for p in points if (p.sweep, p.arm) == (sweep, arm) and least <= p.level <= most]
+        faults, episodes = sum(p.at_fault for p in chosen), sum(len(p.played) for p in chosen)
+        broken, pairs = (sum(p.broken[k] for p in chosen) for k in range(2))
+        return (
+            f"{spaced(broken)} of {spaced(pairs)} duties broken and {faults} of {spaced(episodes)} episodes at fault "
+            f"{percent(faults, episodes)[percent(faults, episodes).index('[') :]} %"
         )
-    kept, broken = at("excess", "inflated", 1.0), at("excess", "inflated")
+
+    lines = [
+        f"{WORDS[sweep][0]}, all levels: inflated {said(sweep, 'inflated')}; as seen {said(sweep, 'as seen')}."
+        for sweep in ("noise", "misses", "latency")
+    ]
     lines.append(
-        f"Where errors are what inflation is told, {kept[0]} of {spaced(kept[1])} episodes; over all levels of a "
-        f"sensor that is worse than it says, {broken[0] - kept[0]} of {spaced(broken[1] - kept[1])}."
+        f"Latency of 0.4 s with a response time of 0.8 s: inflated {said('response', 'inflated', least=0.8)}; as seen "
+        f"{said('response', 'as seen', least=0.8)}."
     )
+    lines.append(f"All at once, as bad as said: inflated {said('excess', 'inflated', most=1.0)}.")
+    lines.append(f"Worse than said: inflated {said('excess', 'inflated', least=1.1)}.")
     return "\n".join(["## What it says", "", *(f"- {line}" for line in lines)])
 
 
@@ -322,7 +350,8 @@ def main(config: Config) -> int:
     parts += [pac_part(4 * config.episodes), redundancy_part(config.decisions)]
     if config.write:
         plot(points, FIGURE)
-        picture = "![Episodes at fault against noise, misses, latency and a broken promise](../sensing.png)"
+        alt = "Broken duties and episodes at fault against noise, misses, response time and a broken promise"
+        picture = f"![{alt}](../sensing.png)"
         write_page(PAGE, [HEADER, summary(points), picture, *parts])
     else:
         print("\n\n".join([summary(points), *parts]))

@@ -114,10 +114,10 @@ def simulate_redundancy(
 def _summed_up(n: int, patterns: np.ndarray, joint: int, rng: np.random.Generator) -> Redundancy:
     singles, c, bound = _rates(n, patterns)
     drawn = [_rates(n, np.array([rng.multinomial(n, one / n) for one in patterns])) for _ in range(RESAMPLES)]
-    intervals = [
-        Interval(value, *map(float, np.quantile(values, (0.025, 0.975))), n, DECISIONS)
-        for value, values in ((c, [one[1] for one in drawn]), (bound, [one[2] for one in drawn]))
-    ]
+    intervals = []
+    for value, values in ((c, [one[1] for one in drawn]), (bound, [one[2] for one in drawn])):
+        low, high = np.quantile(values, (0.025, 0.975))
+        intervals.append(Interval(value, float(low), float(high), n, DECISIONS))
     rate, both = (clopper_pearson(int(k), n)._replace(over=DECISIONS) for k in (singles.max(), joint))
     return Redundancy(n, rate, intervals[0], both, intervals[1])
 
