@@ -33,7 +33,8 @@ def make(
         semantic actions in place of meta-actions, see `SemanticActions`.
       kwargs: the other options of a shield: `rules`, `intervention_penalty`, `penalty_on`, `record`, `entry`, `intent`,
         `waiting`, `traffic`, `examine`, `risk`, `measures`, `filter`, `filter_at`, `correction`, `evasion`,
-        `replace`, `judge_params`, `judge_rules`, see `ShieldWrapper`. The rest is passed to `gymnasium.make`, e.g.
+        `replace`, `judge_params`, `judge_rules`, `sensing`, `conditions`, `classes`, see `ShieldWrapper`. The rest
+        is passed to `gymnasium.make`, e.g.
         `config={"vehicles_count": 30}`, `render_mode="rgb_array"`.
 
     Raises:
@@ -47,6 +48,10 @@ def make(
         raise ValueError(f"traffic = {options.traffic!r}: expected 'stock' without a shield; use shield = 'monitor'")
     if shield is None and options.risk:
         raise ValueError(f"risk = {options.risk!r}: expected False without a shield; use shield = 'monitor'")
+    for name in ("sensing", "conditions", "classes"):
+        if shield is None and getattr(options, name) is not None:
+            given_as = f"{name} = {getattr(options, name)!r}"
+            raise ValueError(f"{given_as}: expected None without a shield; use shield = 'monitor'")
     try:
         env = make_stock(env_id, **rest)
     except gym.error.Error as error:

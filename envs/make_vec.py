@@ -12,10 +12,11 @@ from highway_env.envs.common.action import DiscreteMetaAction
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.arguments import rules_of, seed_of, whole
-from rss_shield.envs.fast.config import Unsupported, compile_scenario
+from rss_shield.envs.fast.config import Scenario, Unsupported, compile_scenario
 from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
 from rss_shield.envs.fast.semantic import SemanticVectorEnv
 from rss_shield.envs.fast.vector import FastVectorEnv
+from rss_shield.envs.fast.views.record import KINEMATICS, TIME_TO_COLLISION
 from rss_shield.envs.make import make
 from rss_shield.envs.options import (
     MODES,
@@ -26,10 +27,16 @@ from rss_shield.envs.options import (
     check_environment,
     check_replace,
     check_risk,
+    ground_in,
+    on_ground,
+    scheme_of,
+    sensing_in,
     settings_for,
     split,
 )
 from rss_shield.envs.semantic.settings import SemanticSettings, check_unreplaced, semantic_settings
+from rss_shield.envs.sensing import Sensing
+from rss_shield.shield.ground import Ground
 from rss_shield.shield.risk import RiskSettings
 
 BACKENDS = ("fast", "highway-env")
@@ -66,9 +73,9 @@ def make_vec(
         of single environments around each where the backend is "highway-env".
       semantic_actions: True, or a dict of the fields of `SemanticSettings` that differ, see `SemanticActions`.
       kwargs: `max_episode_steps`; `render_mode` (the engine knows "rgb_array"); `rules`, `intervention_penalty`,
-        `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `evasion`, `replace`
-        and `risk` of `ShieldWrapper`; and whatever else `make` takes (`traffic`, `judge_params`, ...) where the backend
-        is "highway-env".
+        `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `evasion`,
+        `replace`, `risk`, `conditions`, `classes` and, along lanes, `sensing` of `ShieldWrapper`; and whatever else
+        `make` takes (`traffic`, `judge_params`, ...) where the backend is "highway-env".
 
     Raises:
       ValueError: unknown names, or something that the engine does not support; the message names it.
@@ -124,8 +131,13 @@ def _in_engine(
         check_unreplaced(options)
         if wanted == AutoresetMode.SAME_STEP:
             autoreset_mode = AutoresetMode.DISABLED
+    ground = _ground_in(scenario, settings, options)
+    if settings is not None:
+        settings = on_ground(settings, ground)
     rules = settings, penalty, autoreset_mode, threads, by_change, replaces, risk, rest.get("render_mode")
-    env = FastVectorEnv(scenario, num_envs, *rules, semantic is not None)
+    env = FastVectorEnv(
+        scenario, num_envs, *rules, semantic is not None, _sensing_in(scenario, shield, options), ground
+    )
     return env if semantic is None else SemanticVectorEnv(env, semantic, wanted)
 
 
@@ -153,6 +165,36 @@ def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
         kind = type(stock.action_type).__name__
         raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
     return settings
+
+
+def _ground_in(scenario: Scenario, settings: Settings | None, options: Options) -> Ground | None:
+    """Conditions of the road and classes of vehicles."""
+    if settings is not None:
+        return ground_in(scenario.stock, settings, options.conditions, options.classes)
+    for name in ("conditions", "classes"):
+        if getattr(options, name) is not None:
+            raise ValueError(f"{name} = {getattr(options, name)!r}: expected None without a shield; use 'monitor'")
+    return None
+
+
+def _sensing_in(scenario: Scenario, shield: str | None, options: Options) -> Sensing | None:
+    """What goes wrong with what is seen."""
+    if options.sensing is not None and shield is None:
+        raise ValueError(f"sensing = {options.sensing!r}: expected None without a shield; use shield = 'monitor'")
+    sensing = sensing_in(scenario.stock, options.sensing)
+    if sensing is None:
+        return None
+    if scheme_of(scenario.stock) == PLANS:
+        raise Unsupported("sensing where roads cross", "backend = 'highway-env'")
+    kind = scenario.view.record[0]["kind"]
+    if sensing.agent and (kind not in (KINEMATICS, TIME_TO_COLLISION) or scenario.glances):
+        raise Unsupported("sensing.agent with observations of that type", "agent = False, or backend = 'highway-env'")
+    if sensing.agent and sensing.ghosts > 0.0 and kind == TIME_TO_COLLISION:
+        raise Unsupported("sensing.ghosts in observed times to collision", "agent = False, or backend = 'highway-env'")
+    if scenario.linear is not None:
+        raise Unsupported("sensing among linear drivers", "backend = 'highway-env'")
+    sensing.sensor(float(scenario.config["dt"][0]))
+    return sensing
 
 
 def _risk_in(shield: str | None, options: Options) -> RiskSettings | None:

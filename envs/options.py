@@ -18,11 +18,15 @@ from highway_env.envs.two_way_env import TwoWayEnv
 from highway_env.envs.u_turn_env import UTurnEnv
 
 from rss_shield.envs.arguments import number, preset_of, rules_of
+from rss_shield.envs.conditions import ground_of, pieces_of, shares_of
 from rss_shield.envs.roads.bicycle import longest_frame
+from rss_shield.envs.sensing import Sensing
 from rss_shield.envs.stock import LOWEST_FREQUENCY, check_frequencies
 from rss_shield.envs.worlds.occluded import OccludedIntersectionEnv
+from rss_shield.envs.worlds.signalised import SignalisedIntersectionEnv
 from rss_shield.envs.worlds.streets import StreetEnv
 from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
+from rss_shield.shield.ground import CONDITIONS, Ground
 from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
 from rss_shield.shield.junctions.plans import ANY, INTENTS
@@ -94,6 +98,9 @@ class Given(TypedDict, total=False):
     replace: str
     judge_params: Params
     judge_rules: Rules | Mapping[str, Any] | None
+    sensing: Sensing | Mapping[str, Any] | None
+    conditions: str | Mapping[tuple[float, float], str] | None
+    classes: Mapping[str, float] | None
 
 
 @dataclass(frozen=True)
@@ -123,6 +130,9 @@ class Options:
     replace: str = "frame"
     judge_params: Params = None
     judge_rules: Rules | Mapping[str, Any] | None = None
+    sensing: Sensing | Mapping[str, Any] | None = None
+    conditions: str | Mapping[tuple[float, float], str] | None = None
+    classes: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         number("intervention_penalty", self.intervention_penalty, 0.0)
@@ -140,6 +150,9 @@ class Options:
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected one of {', '.join(known)}")
 
+        Sensing.of(self.sensing)
+        pieces_of(self.conditions)
+        shares_of(self.classes)
         for name in ("measures", "evasion"):
             if not isinstance(getattr(self, name), bool):
                 raise ValueError(f"{name} = {getattr(self, name)!r}: expected True or False")
@@ -311,6 +324,47 @@ def check_replace(options: Options, env: Any) -> None:
     if options.replace == "decision" and not isinstance(env.action_type, DiscreteMetaAction):
         kind = type(env.action_type).__name__
         raise ValueError(f"replace = 'decision' with action type {kind}: expected DiscreteMetaAction, or 'frame'")
+
+
+def sensing_in(env: Any, given: Any) -> Sensing | None:
+    """What goes wrong with what a shield sees in an environment; None = nothing."""
+    sensing = Sensing.of(given)
+    if sensing is None:
+        return None
+    if scheme_of(env) == OPEN_SPACE:
+        raise ValueError("sensing: expected None where nothing is marked")
+    if sensing.inflate and scheme_of(env) != LANES:
+        raise ValueError("sensing.inflate = True: expected False where roads cross")
+    if sensing.wrong_light > 0.0 and not isinstance(env, SignalisedIntersectionEnv):
+        raise ValueError(f"sensing.wrong_light = {sensing.wrong_light!r}: expected 0 where there are no lights")
+    return sensing
+
+
+def ground_in(env: Any, settings: Settings, conditions: Any, classes: Any) -> Ground | None:
+    """The ground of an environment, None where all of it is alike; see `on_ground`.
+
+    Raises:
+      ValueError: where roads cross there is one condition for all, and cars are all there are.
+    """
+    if settings.scheme == OPEN_SPACE and conditions is not None:
+        raise ValueError(f"conditions = {conditions!r}: expected None where nothing is marked")
+    if settings.scheme != LANES and classes is not None:
+        raise ValueError(f"classes = {classes!r}: expected None where roads cross")
+    if settings.scheme != LANES and isinstance(conditions, Mapping):
+        raise ValueError(f"conditions = {conditions!r}: expected one of {', '.join(CONDITIONS)} where roads cross")
+    return ground_of(settings.table, conditions, classes)
+
+
+def on_ground(settings: Settings, ground: Ground | None) -> Settings:
+    """What a shield runs with on that ground: its parameters change with the place, but where roads cross."""
+    if ground is None:
+        return settings
+    table = settings.table
+    if settings.scheme == LANES:
+        return settings._replace(table=table._replace(others=ground.other))
+    state = int(ground.roads[0]) * (len(CONDITIONS) + 1)
+    ego, other = (RSSParams(*map(float, rows[state])) for rows in (ground.ego, ground.other))
+    return settings._replace(table=table._replace(ego=ego, other=other))
 
 
 def scheme_of(env: Any) -> int:

@@ -6,7 +6,7 @@ Cars" (arXiv:1708.06374). Braking parameters are positive magnitudes.
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class RSSParams(NamedTuple):
@@ -296,3 +296,4 @@ class Table(NamedTuple):
     other: RSSParams
     rules: Rules
     dt: float  # length of a frame [s]
+    others: Any = None  # `[K, 10]` rows of those who are not like `other` (`shield.ground`); None = all are

@@ -80,7 +80,8 @@ JUDGED = (
     *("dangerous_pairs", "broken_duties", "episode_dangerous_pairs", "episode_broken_duties"),
     *(name for name, _ in _CONTACT),
 )  # what a judge with a table of its own says
-COUNTED = tuple(name for name, _ in EPISODE_FIELDS if name not in dict(_CONTACT))
+CONTACT = tuple(name for name, _ in _CONTACT)
+COUNTED = tuple(name for name, _ in EPISODE_FIELDS if name not in CONTACT)
 
 
 @compiled
@@ -105,6 +106,17 @@ def start_episode(episode):
     episode.blame = episode.blame_kind = episode.blame_frames = episode.ego_duty = episode.other_duty = 0
     episode.blame_partner = -1
     episode.ego_excess = episode.other_excess = 0.0
+
+
+@compiled
+def copy_judgement(step, episode, judge_step, judge):
+    """Take over what a judge says of the contact and of the last decision; the records are as in `count_frame`."""
+    step.dangerous_pairs, step.broken_duties = judge_step.dangerous_pairs, judge_step.broken_duties
+    episode.dangerous_pairs, episode.broken_duties = judge.dangerous_pairs, judge.broken_duties
+    episode.blame, episode.blame_partner = judge.blame, judge.blame_partner
+    episode.blame_kind, episode.blame_frames = judge.blame_kind, judge.blame_frames
+    episode.ego_duty, episode.ego_excess = judge.ego_duty, judge.ego_excess
+    episode.other_duty, episode.other_excess = judge.other_duty, judge.other_excess
 
 
 @compiled

@@ -36,6 +36,7 @@ OWES = {
     "shield.table",
     "shield.verdicts",
     "shield.geometry",
+    "shield.ground",
     "shield.command",
     "shield.chosen",
     "shield.anything",
@@ -44,7 +45,7 @@ OWES = {
 KEEPERS = {"shield.lanes", "shield.junctions", "shield.open_space", "shield.people", "shield.filters"}
 BELOW = LAWS | OWES | KEEPERS | {"shield.tally", "shield.trace"}
 ROADS = {"envs._numpy", "envs.compiled", "envs.roads"}
-ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.worlds"}
+ENTRY = {"envs.options", "envs.arguments", "envs.stock", "envs.sensing", "envs.conditions", "envs.worlds"}
 MAY_IMPORT = {
     "shield._numba": set(),
     "shield.params": set(),
@@ -59,6 +60,8 @@ MAY_IMPORT = {
     "envs._numpy": {"envs.compiled", "shield._numba"},
     "envs.compiled": {"envs._numpy", "shield._numba"},
     "envs.roads": ROADS | BELOW,
+    "envs.conditions": {"envs.arguments", "envs.sensing", "shield._numba", "shield.ground", "shield.params"},
+    "envs.sensing": {"envs.arguments", "shield._numba", "shield.lanes", "shield.sampling"},
     "envs.worlds": {"envs.stock"} | ROADS | BELOW,
     "envs.decisions": ROADS | BELOW,
     "envs.semantic": ROADS | BELOW | {"envs.worlds"},

@@ -13,6 +13,7 @@ import numpy as np
 from numba import typeof
 
 from rss_shield.envs.compiled import kernel, unfolded
+from rss_shield.envs.conditions import group_of, held
 from rss_shield.envs.decisions.foresight import without_anticipation
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.draws import load_generator
@@ -31,6 +32,7 @@ from rss_shield.envs.fast.guard import (
     plans_of,
     refuse_lane_change,
     ride_of,
+    start_judging,
     start_watch,
     watch_frame,
 )
@@ -38,7 +40,8 @@ from rss_shield.envs.fast.linear_drivers import start_habits
 from rss_shield.envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past
 from rss_shield.envs.fast.rating import is_truncated
 from rss_shield.envs.fast.risk import RISK, Field, begin_looks, compile_field, meter_of, report_risk, start_risk
-from rss_shield.envs.fast.sight import make_sight, sort_along_x
+from rss_shield.envs.fast.senses import GHOSTS, Sensed, aware_of, begin_episode, look, make_sensed
+from rss_shield.envs.fast.sight import make_sight, project, sort_along_x
 from rss_shield.envs.fast.state import CAR, EPISODE, LINEAR_CAR, STEP
 from rss_shield.envs.fast.tasks import is_terminated, make_scene, rate
 from rss_shield.envs.fast.threads import Crew
@@ -49,8 +52,10 @@ from rss_shield.envs.options import PLANS, Settings
 from rss_shield.envs.roads.lanes import tightest
 from rss_shield.envs.roads.network import Network
 from rss_shield.envs.semantic.outlook import PLAN_FIELDS
+from rss_shield.envs.sensing import Sensing
 from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, rare
 from rss_shield.shield.comfort import RIDE
+from rss_shield.shield.ground import Ground
 from rss_shield.shield.junctions.controller import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
 from rss_shield.shield.risk import RiskSettings
@@ -81,6 +86,7 @@ class World(NamedTuple):
     lane_odds: np.ndarray
     linear: np.ndarray | None  # `[6]` as in `linear_drivers`, where the traffic is of that kind
     field: Field | None  # of the measure of risk, where somebody asked for it
+    ground: Ground | None  # where not all of it, or not everybody on it, is alike
 
 
 class Batch(NamedTuple):
@@ -94,6 +100,7 @@ class Batch(NamedTuple):
     crossings: np.ndarray | None  # `[E, N]` CROSSING, with `World.ways`
     rides: np.ndarray | None  # `[E]` RIDE
     risks: np.ndarray | None  # `[E]` RISK, with `World.field`
+    sensed: Sensed | None  # where an ego does not see what is there
 
 
 class Inputs(NamedTuple):
@@ -134,6 +141,26 @@ def _populate(cars, episode, order, world, sight, flow):
         make_scene(cars, episode, order, net, net.lanes, config, world.target_speeds, world.lane_odds, linear)
     else:
         open_intersection(cars, episode, order, net, sight, config, flow, world.target_speeds, linear)
+    _draw_groups(cars, episode, world.ground)
+
+
+@inner
+def _draw_groups(cars, episode, ground):
+    """Vehicle classes; the ego is a car."""
+    if ground is not None:
+        for i in range(episode.vehicles):
+            cars[i].group = group_of(episode.state_low, i, ground.shares)
+        cars[episode.ego].group = 0
+
+
+@inner
+def _hold(cars, episode, ground):
+    """Everybody does what tyres and brakes admit."""
+    if ground is not None:
+        for i in range(episode.vehicles):
+            car = cars[i]
+            group = -1 if i == episode.ego else car.group
+            car.acceleration = held(car.acceleration, ground, car.x, group)
 
 
 @inner
@@ -147,30 +174,53 @@ def _go_on(cars, episode, order, world, plans, watch, flow):
 
 
 @rare
-def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, out):
+def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, out, aware):
     """Begin a new episode and observe it."""
     config, lanes = world.config[0], world.network.lanes
     _populate(cars, episode, order, world, sight, world.flow)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
     survey(cars, episode, world.network, sight, world.flow)
     sort_along_x(cars, episode.cars, order)
-    start_watch(episode, distances, plans, ride, watch)
+    start_watch(cars, episode, distances, plans, ride, watch, aware)
     start_risk(meter)
     start_decision(step)
     step.raw_reward = rate(cars, episode, NO_ACTION, lanes, sight, config, step)
     _report(cars, episode, ride, 0.0, step)
-    _see_apart(cars, episode, world, sight, out)
+    _see_apart(cars, episode, world, sight, out, aware)
 
 
 @inner
-def _see(cars, episode, world, sight, out):
+def _see(cars, episode, world, sight, out, aware):
+    """What the agent observes: what is there, or what is sensed."""
+    if aware is None:
+        _observe(cars, episode, world, sight, out)
+    else:
+        _see_sensed(cars, episode, world, sight, out, aware)
+
+
+@inner
+def _see_sensed(cars, episode, world, sight, out, aware):
+    if not aware.sensor.to_agent:
+        _observe(cars, episode, world, sight, out)
+        return
+    n = episode.cars
+    look(cars, episode, aware)
+    project(aware.cars, n + GHOSTS, world.network, sight)
+    episode.cars = n + GHOSTS
+    _observe(aware.cars, episode, world, sight, out)
+    episode.cars = n
+    project(cars, n, world.network, sight)
+
+
+@inner
+def _observe(cars, episode, world, sight, out):
     observe(cars, episode, world.network, sight, world.sees, world.target_speeds, world.config[0].period, out)
 
 
 @rare
-def _see_apart(cars, episode, world, sight, out):
+def _see_apart(cars, episode, world, sight, out, aware):
     """`_see` where it is rare; the kernel would else contain it thrice."""
-    _see(cars, episode, world, sight, out)
+    _see(cars, episode, world, sight, out, aware)
 
 
 @part
@@ -184,13 +234,16 @@ def _report(cars, episode, ride, cost, step):
 
 
 @unfolded
-def _advance(e, cars, episode, order, world, sight, distances, plans, ride, meter, watch, settings, inputs, film, step):
+def _advance(
+    e, cars, episode, order, world, sight, distances, plans, ride, meter, watch, settings, inputs, film, step, aware
+):
     """One decision of one environment, frame by frame."""
     config, net, flow = world.config[0], world.network, world.flow
     lanes = net.lanes
     ego = cars[episode.ego]
     survey(cars, episode, net, sight, flow)
     start_decision(step)
+    start_judging(aware)
     begin_looks(meter)
     had_contact = episode.blame != 0
     for frame in range(config.frames):
@@ -213,33 +266,34 @@ def _advance(e, cars, episode, order, world, sight, distances, plans, ride, mete
             if first == 0:
                 follow(e, frame, inputs.trajectories, cars, episode, lanes, sight)
                 changing = _guard(
-                    cars, episode, changing, lanes, sight, distances, plans, ride, meter, watch, settings, step
+                    cars, episode, changing, net, sight, distances, plans, ride, meter, watch, settings, step, aware
                 )
             first, last = last, episode.vehicles
+        _hold(cars, episode, world.ground)
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
             for i in range(len(cars)):
                 film.cars[film.slots[e], frame, i] = cars[i]
     episode.time += config.period
     episode.steps += 1
-    return _cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step)
+    return _cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step, aware)
 
 
 @inner
-def _guard(cars, episode, changing, lanes, sight, distances, plans, ride, meter, watch, settings, step):
+def _guard(cars, episode, changing, net, sight, distances, plans, ride, meter, watch, settings, step, aware):
     """`watch_frame` where there is a shield; returns `changing`, with an ego that was given its lane back."""
     if ride is None:
         return changing
-    watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watch, settings, step)
+    watch_frame(cars, episode, net, sight, distances, plans, ride, meter, watch, settings, step, aware)
     return note_change(cars, episode.ego, changing, sight)
 
 
 @inner
-def _cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step):
+def _cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step, aware):
     """1.0 if the ego has broken its proper response in a decision, or a contact was its fault."""
     cost = 0.0
     if ride is not None:
-        check_contact(cars, episode, lanes, sight, distances, plans, watch, settings)
+        check_contact(cars, episode, lanes, sight, distances, plans, watch, settings, aware)
         if step.broken_duties > 0 or (not had_contact and charges_ego(episode.blame - 1)):
             cost = 1.0
     return cost
@@ -259,6 +313,9 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
         distances, plans = distances_of(e, world.frames, batch.past), plans_of(e, world.ways, batch.crossings)
         ride, meter = ride_of(e, batch.rides), meter_of(e, world.field, batch.risks)
         observation = outputs.observations[e]
+        if inputs.todo[e] == RESTART or (inputs.todo[e] == DECIDE and autoreset == NEXT_STEP and episode.ended):
+            begin_episode(e, batch.sensed)
+        aware = aware_of(e, batch.sensed, world.frames)
         if inputs.todo[e] == STAY:
             _start_outputs(e, outputs)
             _report(cars, episode, ride, 0.0, step)
@@ -267,7 +324,8 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
             continue
         if inputs.todo[e] == RESTART or (inputs.todo[e] == DECIDE and autoreset == NEXT_STEP and episode.ended):
             _start_outputs(e, outputs)
-            _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, observation)
+            places = sight, distances, plans, ride, meter
+            _restart(cars, episode, order, world, *places, watch, step, observation, aware)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = DONE
             continue
@@ -289,8 +347,9 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
                 inputs,
                 film,
                 step,
+                aware,
             )
-            _see(cars, episode, world, sight, observation)
+            _see(cars, episode, world, sight, observation, aware)
             reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
             step.raw_reward = reward
             charged = step.acceleration_changed if by_change else float(step.overridden)
@@ -312,7 +371,10 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
                 outputs.final_observations[e, k] = observation[k]
             outputs.final_steps[e] = step
             report_risk(e, meter, outputs.final_risks)
-            _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, observation)
+            begin_episode(e, batch.sensed)
+            aware = aware_of(e, batch.sensed, world.frames)
+            places = sight, distances, plans, ride, meter
+            _restart(cars, episode, order, world, *places, watch, step, observation, aware)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = RESTART
 
@@ -336,6 +398,8 @@ class Engine:
       by_change: the penalty is times the mean change of acceleration instead [m/s^2].
       risk: settings of the measure of risk around each ego, None = nobody asked; it needs a shield.
       follows: the egos carry out `trajectories`, which are written before each step.
+      sensing: what goes wrong with what an ego sees, None = nothing; it needs a shield that keeps distances.
+      ground: conditions of the road and classes of vehicles, None = dry, and cars; it needs a shield, too.
     """
 
     def __init__(
@@ -349,6 +413,8 @@ class Engine:
         by_change: bool = False,
         risk: RiskSettings | None = None,
         follows: bool = False,
+        sensing: Sensing | None = None,
+        ground: Ground | None = None,
     ) -> None:
         n = scenario.capacity
         self.scenario = scenario
@@ -357,13 +423,14 @@ class Engine:
         self.penalty, self.by_change = float(penalty), bool(by_change)
         self.settings = settings or Settings(table_for(PRESETS["simulator"], Rules(), 1.0), False)
         network, net = scenario.stock.road.network, scenario.network
+        seen = n if sensing is None else n + GHOSTS
         frames = ways = past = crossings = None
         if settings is not None and settings.scheme == PLANS:
             ways = compile_ways(network, net, float(scenario.config["dt"][0]))
             crossings = np.zeros((num_envs, n), CROSSING)
         elif settings is not None:
-            frames = compile_lane_frames(network, settings)
-            past = make_past(num_envs, n)
+            frames = compile_lane_frames(network, settings, ground)
+            past = make_past(num_envs, seen)
         self.world = World(
             scenario.config,
             scenario.flow,
@@ -376,6 +443,7 @@ class Engine:
             scenario.lane_odds,
             scenario.linear,
             None if risk is None else compile_field(network, risk, self.settings),
+            ground,
         )
         self.batch = Batch(
             np.zeros((num_envs, n), CAR if scenario.linear is None else LINEAR_CAR),
@@ -385,11 +453,13 @@ class Engine:
             crossings,
             None if settings is None else np.zeros(num_envs, RIDE),
             None if risk is None else np.zeros(num_envs, RISK),
+            None if sensing is None else make_sensed(sensing, self.settings, num_envs, n),
         )
         frames_of_decision = np.zeros((0, int(scenario.config["frames"][0]), n), self.batch.cars.dtype)
         self.film = Film(np.full(num_envs, -1, np.int64), frames_of_decision)
         planned = num_envs, int(scenario.config["frames"][0]), PLAN_FIELDS
         self.trajectories = np.zeros(planned) if follows else None
+        self.sensing = sensing
         self._seen: np.ndarray | None = None  # last observations
         last = scenario.glances[-1] if scenario.glances else None
         self._size = last.start + last.size if last else int(np.prod(scenario.observation_space.shape or 1))
@@ -399,10 +469,10 @@ class Engine:
         self._foresees: Callable[..., None] | None = None  # `foresee`, likewise
         grids = [view.record[0] for view in (scenario.view, *(glance.view for glance in scenario.glances))]
         grid = [max(int(one[name]) for one in grids) for name in ("speeds", "lanes", "times")]
-        self._sights = [make_sight(len(net.lanes), n, grid, scenario.linear) for _ in range(threads)]
+        self._sights = [make_sight(len(net.lanes), seen, grid, scenario.linear) for _ in range(threads)]
         self._watch = make_watch(self.settings.table.rules.heading_bound, tightest(network))
         self._calm = without_anticipation(self.settings)
-        self._desks = [make_desk(n, len(scenario.labels)) for _ in range(threads)]
+        self._desks = [make_desk(seen, len(scenario.labels)) for _ in range(threads)]
 
     def seed(self, seeds) -> None:
         """Give environments the generators that highway-env would have.
@@ -413,6 +483,8 @@ class Engine:
         for e, seed in enumerate(seeds):
             if seed is not None:
                 load_generator(self.batch.episodes[e], np.random.PCG64(np.random.SeedSequence(seed)))
+                if self.sensing is not None and self.batch.sensed is not None:
+                    self.batch.sensed.keys[e], self.batch.sensed.count[e] = self.sensing.keys(seed), 0
 
     def reset(self, mask=None) -> Outputs:
         """Begin new episodes, in all environments or where `mask` `[E]` says so; the others stand still."""

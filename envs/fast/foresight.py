@@ -14,7 +14,9 @@ from rss_shield.envs.decisions.masks import allow
 from rss_shield.envs.fast.drivers import take_meta_action
 from rss_shield.envs.fast.frame import survey
 from rss_shield.envs.fast.guard import Plans, is_refused, scene_of
-from rss_shield.envs.fast.neighbours import Distances, Past, make_past, measure, row_before
+from rss_shield.envs.fast.neighbours import Distances, Past, make_past, measure, row_before, stand_on
+from rss_shield.envs.fast.senses import GHOSTS, aware_of, look
+from rss_shield.envs.fast.sight import project
 from rss_shield.envs.fast.state import EPISODE
 from rss_shield.envs.roads.network import heading_at
 from rss_shield.envs.roads.steering import PURSUIT
@@ -69,15 +71,30 @@ def foresee(begin, end, sight, desk, world, batch, watch, settings, masks):
                 mask[a] = True
             continue
         survey(cars, episode, net, sight, world.flow)
-        _look_ahead(e, world.frames, world.ways, cars, episode, sight, desk, world, batch, watch, settings)
+        aware = aware_of(e, batch.sensed, world.frames)
+        if aware is None:
+            _look_ahead(e, world.frames, world.ways, cars, episode, sight, desk, world, batch, watch, settings, None)
+        else:
+            _look_ahead_as_seen(e, cars, episode, sight, desk, world, batch, watch, settings, aware)
         allow(desk.first, config.frames, world.labels, mask)
 
 
 @inner
-def _look_ahead(e, frames, ways, cars, episode, sight, desk, world, batch, watch, settings):
+def _look_ahead_as_seen(e, cars, episode, sight, desk, world, batch, watch, settings, aware):
+    """`_look_ahead` at the cars that are seen."""
+    n = episode.cars
+    look(cars, episode, aware)
+    project(aware.cars, n + GHOSTS, world.network, sight)
+    episode.cars = n + GHOSTS
+    _look_ahead(e, world.frames, world.ways, aware.cars, episode, sight, desk, world, batch, watch, settings, aware)
+    episode.cars = n
+
+
+@inner
+def _look_ahead(e, frames, ways, cars, episode, sight, desk, world, batch, watch, settings, aware):
     """Of `frames` and `ways` one is None, and numba leaves out what it would need."""
     if frames is not None:
-        _foresee_on_lanes(e, cars, episode, sight, desk, world, batch, watch, settings)
+        _foresee_on_lanes(e, cars, episode, sight, desk, world, batch, watch, settings, aware)
     if ways is not None:
         _foresee_at_junctions(e, cars, episode, sight, desk, world, batch, settings)
 
@@ -97,13 +114,15 @@ def _put_back(car, choice):
 
 
 @part
-def _foresee_on_lanes(e, cars, episode, sight, desk, world, batch, watch, settings):
+def _foresee_on_lanes(e, cars, episode, sight, desk, world, batch, watch, settings, aware):
     config, net, lanes, past = world.config[0], world.network, world.network.lanes, desk.past
     _copy_past(past, batch.past, e, episode.cars)
     desk.episode[0] = episode
     copy, car = desk.episode[0], cars[episode.ego]
     distances, near = Distances(world.frames, past), _margin_that_matters(cars, episode, config, settings)
-    bend = measure(cars, copy, lanes, sight, distances, watch.boxes, settings, False, -np.inf, -np.inf, near)
+    settings = stand_on(cars, copy, world.frames.ground, past.memory, settings)
+    limits = False, -np.inf, -np.inf, near
+    bend = measure(cars, copy, lanes, sight, distances, watch.boxes, settings, *limits, aware)
     me = past.ego[copy.turn]
     seen = Seen(me, sight.users, past.ego[row_before(copy)], sight.users_before, past.memory)
     body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack, False)

@@ -10,8 +10,19 @@ import numpy as np
 
 from rss_shield.envs._numpy.floats import norm
 from rss_shield.envs.fast.collisions import is_near, overlap
-from rss_shield.envs.fast.neighbours import Distances, Past, car_of, measure, row_before, start_past
+from rss_shield.envs.fast.neighbours import (
+    Distances,
+    Past,
+    car_of,
+    keep_seen,
+    measure,
+    row_before,
+    stand_on,
+    start_past,
+)
 from rss_shield.envs.fast.risk import look_at_risk
+from rss_shield.envs.fast.senses import GHOSTS, follow, look, start_senses
+from rss_shield.envs.fast.sight import project
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE, OBSTACLE_SIZE, TRAFFIC
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network
 from rss_shield.envs.roads.steering import MAX_SLIP, slip_at, steering_for
@@ -38,7 +49,15 @@ from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up
-from rss_shield.shield.tally import count_change, count_frame, enter_contact, note_executed, start_episode
+from rss_shield.shield.tally import (
+    copy_judgement,
+    count_change,
+    count_frame,
+    enter_contact,
+    note_executed,
+    start_decision,
+    start_episode,
+)
 from rss_shield.shield.verdicts import weight_of
 
 _MOST_TURNED = 0.9  # sine of the angle by which a bend may turn a car against its lane
@@ -123,10 +142,14 @@ def ride_of(e, rides):
 
 
 @rare
-def start_watch(episode, distances, plans, ride, watch):
+def start_watch(cars, episode, distances, plans, ride, watch, aware):
     """Forget everything at the start of an episode."""
     if distances is not None:
         start_past(episode, distances.past, watch.blank)
+    if aware is not None:
+        follow(episode, aware)
+        start_past(aware.judge[0], aware.distances.past, watch.blank)
+        start_senses(cars, episode, aware)
     if plans is not None:
         for i in range(len(plans.crossings)):
             plans.crossings[i] = watch.blank_crossing[0]
@@ -155,13 +178,13 @@ def carry_over(episode, cars, crossings, ego, watch):
 
 
 @inner
-def watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watch, settings, step):
+def watch_frame(cars, episode, net, sight, distances, plans, ride, meter, watch, settings, step, aware):
     """Restrict the ego's command on one frame, unless it has had its contact.
 
     Args:
       cars: `[N]` CAR, all commands chosen.
       episode: EPISODE.
-      lanes: `[L]` LANE.
+      net: `Network`.
       sight: this frame's.
       distances, plans: `Distances` or `Plans`; the other is None.
       ride: RIDE.
@@ -169,24 +192,61 @@ def watch_frame(cars, episode, lanes, sight, distances, plans, ride, meter, watc
       watch: `Watch`.
       settings: `envs.highway.ego.Settings`.
       step: STEP, the tally is kept there.
+      aware: `Aware`; None = the ego sees what is there.
     """
-    if check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
+    lanes = net.lanes
+    if check_contact(cars, episode, lanes, sight, distances, plans, watch, settings, aware):
         return
     if plans is not None:
         _keep_plan(cars, episode, sight, plans, settings, step)
         gap = np.inf
     if distances is not None:
-        _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step)
+        if aware is None:
+            _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step, None)
+        else:
+            _keep_distances_of_seen(cars, episode, net, sight, distances, watch, settings, step, aware)
         gap = sight.z[0]
     ego = cars[episode.ego]
     ride_on(ride, ego.speed, ego.heading, gap, settings.table.dt)
-    look_at_risk(cars, episode, lanes, sight, distances, meter)
+    if aware is None:
+        look_at_risk(cars, episode, lanes, sight, distances, meter)
+    else:
+        look_at_risk(cars, aware.judge[0], lanes, sight, aware.distances, meter)
 
 
 @inner
-def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step):
+def _keep_distances_of_seen(cars, episode, net, sight, distances, watch, settings, step, aware):
+    """`_keep_distances` of the cars that are seen, and the judge's opinion of it."""
+    n, ego, judge, verdict = episode.cars, cars[episode.ego], aware.judge[0], aware.verdict[0]
+    look(cars, episode, aware)
+    project(aware.cars, n + GHOSTS, net, sight)
+    episode.cars = n + GHOSTS
+    _keep_distances(aware.cars, episode, net.lanes, sight, distances, watch, settings, step, aware)
+    keep_seen(episode, distances.past, sight, aware)
+    episode.cars = n
+    if step.partner >= n:  # nobody
+        step.partner = -1
+    seen = aware.cars[episode.ego]
+    ego.acceleration, ego.steering, ego.target_lane = seen.acceleration, seen.steering, seen.target_lane
+    project(cars, n, net, sight)
+    follow(episode, aware)
+    judge.nominal_acceleration, judge.nominal_steering = ego.acceleration, ego.steering
+    _keep_distances(cars, judge, net.lanes, sight, aware.distances, watch, aware.judging, verdict, None)
+    copy_judgement(step, episode, verdict, judge)
+
+
+@inner
+def start_judging(aware):
+    """A decision begins."""
+    if aware is not None:
+        start_decision(aware.verdict[0])
+
+
+@inner
+def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, step, aware):
     """Defs. 1-10, along the lane of the ego."""
     car, past = cars[episode.ego], distances.past
+    settings = stand_on(cars, episode, distances.frames.ground, past.memory, settings)
     if car.kind == DIRECT:
         acceleration, steering = episode.nominal_acceleration, episode.nominal_steering
     else:
@@ -195,7 +255,8 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     nearest, soonest = max(step.margin_lon, step.margin_lat), episode.min_ttc
     others_act = settings.overrides and settings.filter.kind != RSS
     everybody = np.inf if others_act else -np.inf  # other filters look farther
-    bend = measure(cars, episode, lanes, sight, distances, watch.boxes, settings, False, nearest, soonest, everybody)
+    limits = False, nearest, soonest, everybody
+    bend = measure(cars, episode, lanes, sight, distances, watch.boxes, settings, *limits, aware)
     ego, users, memory = past.ego[episode.turn], sight.users, past.memory
     who = past.near[: episode.near]
     danger = find_danger(
@@ -466,8 +527,20 @@ def _describe(car, choice, out):
 
 
 @inner
-def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
-    """Has the ego touched somebody, or is it about to? Judged at the first such sample."""
+def check_contact(cars, episode, lanes, sight, distances, plans, watch, settings, aware):
+    """Has the ego touched somebody, or is it about to? Judged at the first such sample, by what is there."""
+    if aware is None:
+        return _check_contact(cars, episode, lanes, sight, distances, plans, watch, settings)
+    follow(episode, aware)
+    judge, verdict = aware.judge[0], aware.verdict[0]
+    touches = _check_contact(cars, judge, lanes, sight, aware.distances, plans, watch, aware.judging)
+    if touches and episode.blame == 0:
+        copy_judgement(verdict, episode, verdict, judge)
+    return touches
+
+
+@inner
+def _check_contact(cars, episode, lanes, sight, distances, plans, watch, settings):
     ego = cars[episode.ego]
     if episode.blame == 0 and (ego.crashed or ego.hit):
         _judge(cars, episode, lanes, sight, distances, plans, watch, settings)
@@ -479,6 +552,7 @@ def _judge(cars, episode, lanes, sight, distances, plans, watch, settings):
     count, heaviest = _list_partners(cars, episode, sight, settings.table.dt), -1
     if distances is not None:
         episode.near, past = count, distances.past
+        settings = stand_on(cars, episode, distances.frames.ground, past.memory, settings)
         for a in range(count):
             past.near[a] = sight.some[a]
         measure(cars, episode, lanes, sight, distances, watch.boxes, settings, True, np.inf, np.inf, -np.inf)

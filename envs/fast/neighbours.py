@@ -9,18 +9,28 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.envs.fast.state import OBSTACLE
+from rss_shield.envs.fast.state import OBSTACLE, UNSEEN
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import reach_of, road_through, turned_round
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
+from rss_shield.envs.sensing import age_of
 from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
 from rss_shield.shield.geometry import COS, SIN, is_straight
-from rss_shield.shield.lanes.controller import beyond_doubt, look_ahead_of, may_be_next, may_bind
+from rss_shield.shield.ground import STATES, Ground, state_along, table_of_kind, table_on, worse_of
+from rss_shield.shield.lanes.controller import (
+    beyond_doubt,
+    look_ahead_at,
+    look_ahead_of,
+    may_be_next,
+    may_bind,
+)
 from rss_shield.shield.lanes.far_pairs import least_margin, own_share
 from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame
-from rss_shield.shield.lanes.memory import MEMORY, forget_safe
+from rss_shield.shield.lanes.inflation import inflate
+from rss_shield.shield.lanes.memory import MEMORY, forget_safe, start_over
 from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, least_cosine, slowed
+from rss_shield.shield.params import RSSParams
 
 _HALF_DIAGONAL = np.hypot(CAR_LENGTH, CAR_WIDTH) / 2  # no road user is longer, however it is turned [m]
 _ROUNDING = 1e-6  # more than world and lane coordinates differ by [m]
@@ -35,6 +45,7 @@ POSE = np.dtype(
         ("speed", "f8"),  # [m/s]
         ("cos", "f8"),  # of the heading
         ("sin", "f8"),
+        ("kind", "i8"),  # row of its parameters
         ("wreck", "?"),
         ("in_own_lane", "?"),
     ],
@@ -48,6 +59,7 @@ class LaneFrames(NamedTuple):
     pieces: np.ndarray  # `[P, 11]` pieces of the roads through all lanes, then of the same roads turned round
     start: np.ndarray  # `[2 L + 1]` where each road starts among the pieces
     same: np.ndarray  # `[2 L, 2 L]` no gap jumps between the two frames
+    ground: Ground | None = None  # where not all of it, or not everybody on it, is alike
 
 
 class Past(NamedTuple):
@@ -66,13 +78,16 @@ class Distances(NamedTuple):
     past: Past
 
 
-def compile_lane_frames(network, settings: Settings) -> LaneFrames:
+def compile_lane_frames(network, settings: Settings, ground: Ground | None = None) -> LaneFrames:
     """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`: one each, because its lanes do not fork."""
-    reach = reach_of(settings.table.ego, settings.table.other, settings.table.dt)
+    ego, other = settings.table.ego, settings.table.other
+    if ground is not None:  # nobody needs more anywhere
+        ego, other = (RSSParams(*map(float, rows[-1])) for rows in (ground.ego, ground.other))
+    reach = reach_of(ego, other, settings.table.dt)
     lanes = [road_through(network, index, reach) for index in network.lanes_dict()]
     roads = lanes + [turned_round(road) for road in lanes]
     same = np.array([[same_frame(a, b) for b in roads] for a in roads])
-    return LaneFrames(np.concatenate(roads), np.cumsum([0, *map(len, roads)]), same)
+    return LaneFrames(np.concatenate(roads), np.cumsum([0, *map(len, roads)]), same, ground)
 
 
 @inner
@@ -99,7 +114,7 @@ def start_past(episode, past, blank):
     for i in range(len(past.memory)):
         past.memory[i] = blank[0]
         past.trail[0, i].x = past.trail[0, i].y = np.nan
-    episode.frame_road, episode.turn, episode.near = -1, 0, 0
+    episode.frame_road, episode.turn, episode.near, episode.stands = -1, 0, 0, -1
     if len(past.memory) > 0:  # there is a shield
         _mark_all(episode, past)
 
@@ -119,7 +134,7 @@ def car_of(user, episode):
 
 
 @inner
-def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nearest, soonest, within):
+def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nearest, soonest, within, aware=None):
     """Take this frame in, and measure the ego and whoever matters on it in the ego's lane frame.
 
     Who that is stands in `past.near`. The ego's record is in `past.ego`, theirs are in `sight.users`, and those of
@@ -133,6 +148,8 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
       chosen: those who matter are in `past.near` already, the first `episode.near`.
       nearest, soonest: as in `shield.lanes.controller.find_danger`.
       within: whose margin is less than this matters, too [m].
+      aware: `Aware`, whose cars these are, None = these are the cars that are there. Of those who are seen everybody
+        matters.
 
     Returns:
       `shield.lanes.frame.Bend` under the ego.
@@ -152,8 +169,10 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
     _to_record(road, now[episode.ego], before[episode.ego], boxes[0], dt, me)
     me.wreck, me.in_own_lane = False, True
     sight.z[0] = np.inf  # gap ahead
-    threshold = _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest)
-    if not chosen:
+    threshold = _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest, distances)
+    if aware is not None:
+        _choose_seen(cars, episode, past, now, before, earlier, aware, dt)
+    elif not chosen:
         far = beyond_doubt(me.speed, settings.table.ego, dt)
         _choose_near(episode, past, sight.x, max(min(threshold, nearest), far, within) + _ROUNDING)
     for a in range(episode.near):
@@ -163,12 +182,59 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
         box = boxes[1 if car.kind == OBSTACLE else 0]
         _to_record(road, pose, before[k], box, dt, user)
         pose.in_own_lane = _in_own_lane(k, car, ego, lanes, sight)
-        user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
+        user.wreck, user.in_own_lane, user.kind = pose.wreck, pose.in_own_lane, pose.kind
         if not is_straight(road):
             _note_gap(user.s - me.s, user.y - me.y, box, boxes[0], sight)
-        if past.memory[i].skipped:
-            _make_up(road_before, before[k], earlier[k], box, dt, sight.users_before[i])
+        if aware is not None:
+            _settle(i, k, me, jumps, past.memory[i], sight, episode, aware, settings)
+        if past.memory[i].skipped and (aware is None or jumps):
+            _make_up(road_before, before[k], pose.kind, earlier[k], box, dt, sight.users_before[i])
+            if aware is not None:
+                _inflate(k, past.ego[row_before(episode)], sight.users_before[i], episode, aware, settings)
     return look_ahead(road, ego.x, ego.y, ego.speed, ego.length / 2, dt)
+
+
+@inner
+def _choose_seen(cars, episode, past, now, before, earlier, aware, dt):
+    """List whoever is seen, and forget the others. Motion is measured, not how far two measurements are apart."""
+    count = 0
+    for i in range(episode.cars - 1):
+        k = car_of(i, episode)
+        if cars[k].kind == UNSEEN:
+            past.memory[i] = aware.blank[0]
+            continue
+        percept = aware.percepts[k]
+        if percept.since == episode.frames:  # another ghost than on the frame before
+            past.memory[i] = aware.blank[0]
+        before[k].x, before[k].y = now[k].x - percept.vx * dt, now[k].y - percept.vy * dt
+        earlier[k].x, earlier[k].y = before[k].x - percept.vx * dt, before[k].y - percept.vy * dt
+        past.near[count] = i
+        count += 1
+    episode.near = count
+
+
+@inner
+def _settle(i, k, me, jumps, memory, sight, episode, aware, settings):
+    """What is seen of road user `i`, who is car `k`, now and on the frame before."""
+    _inflate(k, me, sight.users[i], episode, aware, settings)
+    if memory.skipped and not jumps:
+        sight.users_before[i] = aware.last[i]
+        sight.users_before[i].kind = sight.users[i].kind
+
+
+@inner
+def _inflate(k, me, user, episode, aware, settings):
+    sensor = aware.sensor
+    if sensor.inflates:
+        inflate(user, me, sensor.accuracy, age_of(aware.percepts[k], episode.frames, sensor), settings.table)
+
+
+@inner
+def keep_seen(episode, past, sight, aware):
+    """Keep what was seen on this frame for the next."""
+    for a in range(episode.near):
+        i = past.near[a]
+        aware.last[i] = sight.users[i]
 
 
 @inner
@@ -178,9 +244,9 @@ def _note_gap(along, across, box, own, sight):
 
 
 @rare
-def _make_up(road, pose, earlier, box, dt, user):
+def _make_up(road, pose, kind, earlier, box, dt, user):
     _to_record(road, pose, earlier, box, dt, user)
-    user.wreck, user.in_own_lane = pose.wreck, pose.in_own_lane
+    user.wreck, user.in_own_lane, user.kind = pose.wreck, pose.in_own_lane, kind
 
 
 @inner
@@ -225,12 +291,59 @@ def _note(car, pose):
 
 
 @inner
+def _note_kind(car, pose, before, memory, ground):
+    """Keep which row of parameters is its own, and start over with a pair for which that is another one now."""
+    pose.kind = 0
+    if ground is not None:
+        first = STATES * car.group
+        pose.kind = first + state_along(ground, ground.other, first, car.x, car.cos, car.speed, car.length / 2)
+        if before.kind != pose.kind:
+            start_over(memory)
+
+
+@inner
+def stand_on(cars, episode, ground, memory, settings):
+    """What the ego runs with where it is. While danger lasts, the road does not get better for it."""
+    if ground is None:
+        return settings
+    ego = cars[episode.ego]
+    state = state_along(ground, ground.ego, 0, ego.x, ego.cos, ego.speed, ego.length / 2)
+    if episode.stands >= 0:
+        for i in range(episode.cars - 1):
+            if memory[i].since > 0:
+                state = worse_of(state, episode.stands)
+                break
+        if state != episode.stands:
+            for i in range(episode.cars - 1):
+                start_over(memory[i])
+    episode.stands = state
+    return with_table(settings, table_on(settings.table, ground, state))
+
+
+@inner
+def with_table(settings, table):
+    """The same settings with another table."""
+    return Settings(
+        table,
+        settings.overrides,
+        settings.scheme,
+        settings.entry,
+        settings.intent,
+        settings.waits_anywhere,
+        settings.examine,
+        settings.filter,
+        settings.correction,
+        settings.evasion,
+    )
+
+
+@inner
 def _to_record(road, pose, before, box, dt, user):
     to_lane_frame(road, pose.x, pose.y, pose.heading, pose.speed, pose.cos, pose.sin, before.x, before.y, box, dt, user)
 
 
 @inner
-def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest):
+def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings, soonest, distances):
     """Note where everybody is, and bound the longitudinal margin of each from below in `sight.x` [m].
 
     Where the bound is -inf nothing is known, or the time to collision may be the shortest.
@@ -238,7 +351,7 @@ def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings
     Returns:
       A margin [m] that the nearest of all has at most: no required distance is negative.
     """
-    straight, bounds = is_straight(road), sight.x
+    straight, bounds, frames, past = is_straight(road), sight.x, distances.frames, distances.past
     cos, sin = road[0, COS], road[0, SIN]
     share = own_share(me.speed, me.cos, settings.table.ego, settings.table.dt)
     lead, least_cos = leading_speed(me, settings.table.rules), least_cosine(settings.table.rules)
@@ -249,6 +362,7 @@ def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings
         k = car_of(i, episode)
         car, pose = cars[k], now[k]
         _note(car, pose)
+        _note_kind(car, pose, before[k], past.memory[i], frames.ground)
         if not straight:
             bounds[i] = -np.inf
             continue
@@ -264,7 +378,7 @@ def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings
             share,
             lead,
             least_cos,
-            settings.table,
+            table_of_kind(settings.table, settings.table.others, pose.kind),
         )
         closing = ego.speed - slowed(car.speed, slant, pose.wreck, least_cos)
         gap_lon, gap_lat = along - half_lengths - _ROUNDING, abs(across) - half_widths
@@ -275,7 +389,8 @@ def _look_over(cars, episode, ego, me, road, now, before, boxes, sight, settings
         _note_gap(along, across, boxes[1 if car.kind == OBSTACLE else 0], boxes[0], sight)
         own_half = boxes[1 if car.kind == OBSTACLE else 0, 3]  # of one that does not drift
         gap_lat = abs(across) - me.half_width - own_half - _ROUNDING
-        binds = may_bind(along >= 0.0, bound, gap_lat, drifts, car.speed, look)
+        there = look_ahead_at(look, me, settings.table, settings.table.others, pose.kind)
+        binds = may_bind(along >= 0.0, bound, gap_lat, drifts, car.speed, there)
         bounds[i] = -np.inf if is_next or oncoming or binds else bound
         nearest = min(nearest, max(abs(along), abs(across)))
     return nearest

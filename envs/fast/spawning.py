@@ -24,7 +24,7 @@ def add_vehicle(cars, episode, x, y, heading, speed, lanes, config):
     car.delta = config.delta
     car.impact_x = car.impact_y = 0.0
     car.length, car.width = CAR_LENGTH, CAR_WIDTH
-    car.kind = TRAFFIC
+    car.kind, car.group = TRAFFIC, 0
     car.lane = car.target_lane = closest_lane(lanes, x, y, heading)
     car.speed_index, car.route, car.route_step, car.vice = 0, -1, 0, NO_VICE
     car.crashed = car.hit = False

@@ -14,6 +14,7 @@ TRAFFIC = 0  # `IDMVehicle`
 META = 1  # `MDPVehicle`, driven by meta-actions
 DIRECT = 2  # `Vehicle`, driven by acceleration and steering
 OBSTACLE = 3  # `Obstacle`
+UNSEEN = 4  # somebody there whom a sensor misses; only among cars as they are seen
 
 OBSTACLE_SIZE = 2.0  # [m]
 
@@ -34,6 +35,7 @@ _OF_A_CAR = [
     ("length", "f8"),  # [m]
     ("width", "f8"),
     ("kind", "i8"),
+    ("group", "i8"),  # its vehicle class, among those on this road
     ("lane", "i8"),  # lane it is on
     ("target_lane", "i8"),  # lane it heads for
     ("speed_index", "i8"),  # among the target speeds, of a META car
@@ -89,6 +91,7 @@ EPISODE = np.dtype(
         ("pairs_possible", "i8"),  # all pair-frames
         ("turn", "i8"),  # row of its trail that the last frame is in
         ("near", "i8"),  # how many others it measured then
+        ("stands", "i8"),  # state of the road that its parameters are for, -1 = none yet
         ("nominal_acceleration", "f8"),  # last command given from outside
         ("nominal_steering", "f8"),
         *EPISODE_FIELDS,

@@ -19,6 +19,8 @@ from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
 from rss_shield.envs.fast.pictures import Painter
 from rss_shield.envs.fast.recording import Recording
 from rss_shield.envs.options import Settings
+from rss_shield.envs.sensing import Sensing
+from rss_shield.shield.ground import Ground
 from rss_shield.shield.risk import RiskSettings
 from rss_shield.shield.tally import info_at
 
@@ -65,6 +67,8 @@ class FastVectorEnv(VectorEnv):
       risk: settings of the driving safety field that is measured around each ego, too; None = not measured.
       render_mode: "rgb_array", or None: nobody looks.
       follows: the egos carry out the engine's `trajectories`; see `envs.fast.semantic`.
+      sensing: what goes wrong with what egos see, None = nothing; where distances along lanes keep them safe.
+      ground: conditions of the road and classes of vehicles, None = dry, and cars.
     """
 
     metadata: dict[str, Any] = {"render_modes": [*RENDER_MODES], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
@@ -82,6 +86,8 @@ class FastVectorEnv(VectorEnv):
         risk: RiskSettings | None = None,
         render_mode: str | None = None,
         follows: bool = False,
+        sensing: Sensing | None = None,
+        ground: Ground | None = None,
     ) -> None:
         self.scenario = scenario
         self.settings = settings
@@ -94,7 +100,7 @@ class FastVectorEnv(VectorEnv):
         self.action_space = batch_space(scenario.action_space, num_envs)
         self.metadata = self.metadata | {"autoreset_mode": autoreset_mode}
         mode = _MODES[autoreset_mode]
-        rules = settings, intervention_penalty, mode, threads, penalty_by_change, risk, follows
+        rules = settings, intervention_penalty, mode, threads, penalty_by_change, risk, follows, sensing, ground
         self.engine = Engine(scenario, num_envs, *rules)
         self._order = order_of(scenario.labels) if replaces and settings is not None and settings.overrides else None
         self.recording = Recording(self.engine)

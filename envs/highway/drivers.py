@@ -14,6 +14,7 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.step import attach, shield_on
 from rss_shield.envs.options import LANES, Settings
 from rss_shield.envs.worlds.walkers import Watched
+from rss_shield.shield.ground import Ground
 from rss_shield.shield.junctions.controller import PRIORITY
 from rss_shield.shield.junctions.plans import KNOWN
 
@@ -40,7 +41,7 @@ def drivers_on(road: Any) -> list[ShieldedEgo]:
     return getattr(road, "drivers", [])
 
 
-def shield_everybody(road: Any, settings: Settings) -> None:
+def shield_everybody(road: Any, settings: Settings, ground: Ground | None = None) -> None:
     """Compliant traffic: a shield for every car that has none yet, but for the ego's.
 
     Where everybody keeps their duties there are no crashes (Lemmas 5 and 6), apart from dangers that cars
@@ -52,6 +53,7 @@ def shield_everybody(road: Any, settings: Settings) -> None:
     Args:
       road: highway-env's road.
       settings: of the ego; its duties hold for everybody.
+      ground: what everybody drives on, where not all of that is alike.
 
     Raises:
       ValueError: a road with pedestrians, or of which the ego does not see everything.
@@ -64,7 +66,7 @@ def shield_everybody(road: Any, settings: Settings) -> None:
     stay = [driver for driver in drivers_on(road) if driver.has_contact or any(driver is one for one in shields)]
     unshielded = [v for v, shield in zip(there, shields, strict=True) if shield is None]
     if settings.scheme == LANES:
-        road.drivers = stay + [attach(vehicle, duties) for vehicle in unshielded]
+        road.drivers = stay + [attach(vehicle, duties, grounds=(ground, None)) for vehicle in unshielded]
         return
     road.drivers = stay + [CompliantDriver(vehicle, duties._replace(intent=KNOWN)) for vehicle in unshielded]
     take_turns(road)

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
-from highway_env.vehicle.objects import Landmark
 
+from rss_shield.envs.highway.senses import Senses, others_on
 from rss_shield.envs.options import LANES, OPEN_SPACE, PLANS, Settings
 from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, roads_along, tightest
 from rss_shield.envs.roads.slip import slip_of, steering_of
@@ -16,6 +16,7 @@ from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
+from rss_shield.shield.ground import STATES, Ground, state_along, table_on, worse_of
 from rss_shield.shield.lanes.controller import (
     Body,
     Response,
@@ -25,11 +26,13 @@ from rss_shield.shield.lanes.controller import (
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
+from rss_shield.shield.lanes.inflation import inflate
 from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
-from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe
+from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, start_over
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
 from rss_shield.shield.tally import (
+    CONTACT,
     COUNTED,
     DECISION_FIELDS,
     EPISODE_FIELDS,
@@ -115,7 +118,10 @@ class ShieldedEgo:
 
     def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
         self.vehicle = vehicle
-        self.settings = settings
+        self.settings = self.given = settings
+        self.ground: Ground | None = None  # where not all of the road, or not everybody on it, is alike
+        self.stands = -1  # state of the road that the ego's parameters are for
+        self.kinds = np.zeros(0, np.int64)  # `[N]` rows of parameters of the others
         self.body = (vehicle.LENGTH / 2, MAX_SLIP)
         self.backs_up = not isinstance(vehicle, ControlledVehicle)  # drivers that keep a speed never ask for it
         self.nominal = dict(vehicle.action)
@@ -147,6 +153,7 @@ class ShieldedEgo:
         self.evading = False  # a manoeuvre has begun, and the danger lasts
         self.answers = False  # does a filter that looks once per decision respond in this one?
         self.cruise: float | None = None  # speed to go back to after braking, where the agent has no say in it [m/s]
+        self.senses: Senses | None = None  # what it sees is what is there; else `judge` sees that
         vehicle.act = self.act
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
@@ -171,10 +178,17 @@ class ShieldedEgo:
             spent = perf_counter() - began
             if self.judge is not self:
                 self.judge.watch()
+            if self.senses is not None:
+                self.senses.note(self.others, self.vehicle)
             if self.measured is not None:
                 self.measured.look(self, spent)
             if self.meter is not None:
-                self.meter.look(self)
+                self.meter.look(self.witness)
+
+    @property
+    def witness(self) -> "ShieldedEgo":
+        """Whoever sees what is there."""
+        return self if self.senses is None else self.judge
 
     def watch(self) -> None:
         """Take in a frame on which another shield has decided."""
@@ -182,11 +196,12 @@ class ShieldedEgo:
         self._frame()
 
     def _frame(self) -> None:
-        vehicle, settings = self.vehicle, self.settings
+        vehicle = self.vehicle
         # meta-actions compute a new command on every frame, a continuous one persists
         nominal = vehicle.action if isinstance(vehicle, ControlledVehicle) else self.nominal
         steering = float(nominal["steering"])  # single precision where the agent's action is
         self._meet()
+        settings = self.settings  # of this place
         users, ego, bend = self._sense()
         wish = self._command(self._throttle(nominal), steering)
         danger = find_danger(ego, users, *self.last, self.memory, settings.table)
@@ -270,7 +285,8 @@ class ShieldedEgo:
         """Index in `road.vehicles`; static objects follow after the vehicles."""
         road = self.vehicle.road
         everybody = [*road.vehicles, *road.objects]
-        return next((k for k, other in enumerate(everybody) if other is self.others[i]), -1)
+        who = self.others[i] if self.senses is None else self.others[i].original
+        return next((k for k, other in enumerate(everybody) if other is who), -1)
 
     # -- lane changes
 
@@ -362,9 +378,14 @@ class ShieldedEgo:
         out = np.zeros(len(poses), ROAD_USER)
         out["wreck"][:-1] = [v.crashed or not hasattr(v, "action") for v in self.others]
         out["in_own_lane"] = [self._in_own_lane(v) for v in [*self.others, self.vehicle]]
+        if self.ground is not None:
+            out["kind"][:-1] = self.kinds
         dt = self.settings.table.dt
         to_lane_frame_all(self.branches, poses[:-1], before[:-1], self.boxes[:-1], dt, out[:-1])
         to_lane_frame_all(self.road, poses[-1:], before[-1:], self.boxes[-1:], dt, out[-1:])
+        if self.senses is not None and self.senses.sensor.inflates:
+            for user, age in zip(out[:-1], self.senses.ages, strict=True):
+                inflate(user, out[-1], self.senses.sensor.accuracy, age, self.settings.table)
         return out[:-1], out[-1]
 
     def _go_around(self, users, ego) -> None:
@@ -397,13 +418,40 @@ class ShieldedEgo:
     def _meet(self) -> None:
         """Find out who is on the road, and where."""
         vehicle = self.vehicle
-        road = vehicle.road
-        users = [*road.vehicles, *(o for o in road.objects if not isinstance(o, Landmark))]
-        # who cannot be touched needs no distance
-        others = [v for v in users if v is not vehicle and v.collidable and vehicle.collidable]
+        others = others_on(vehicle.road, vehicle)
+        if self.senses is not None:
+            others = self.senses.look(others, vehicle, int(self.since["frames"]))
         if others != self.others or len(self.before) != len(others) + 1:
             self._follow(others)
         self.poses = np.array([(*v.position, v.heading, v.speed) for v in [*others, vehicle]], dtype=float)
+        if self.senses is not None:  # motion is measured, not how far two measurements are apart
+            self.before[:-1] = self.poses[:-1, :2] - self.senses.motion * self.settings.table.dt
+        if self.ground is not None:
+            self._stand_on(self.ground)
+
+    def _stand_on(self, ground: Ground) -> None:
+        """Which parameters count where everybody is. While danger lasts, the road does not get better for the ego."""
+        along = np.column_stack([self.poses[:, 0], np.cos(self.poses[:, 2]), self.poses[:, 3]])
+        first = [STATES * getattr(v, "rss_group", 0) for v in self.others]
+        self.kinds = np.array(
+            [
+                row + state_along(ground, ground.other, row, *map(float, place), v.LENGTH / 2)
+                for row, place, v in zip(first, along[:-1], self.others, strict=True)
+            ],
+            np.int64,
+        )
+        state = state_along(ground, ground.ego, 0, *map(float, along[-1]), self.vehicle.LENGTH / 2)
+        if self.stands >= 0 and (self.memory["since"] > 0).any():
+            state = worse_of(state, self.stands)
+        moved_on = self.stands >= 0 and state != self.stands
+        ego_before, users_before = self.last
+        for memory, other in zip(self.memory, self.kinds != users_before["kind"], strict=True):
+            if other or moved_on:
+                start_over(memory)
+        users_before = users_before.copy()
+        users_before["kind"] = self.kinds
+        self.last, self.stands = (ego_before, users_before), state
+        self.settings = self.settings._replace(table=table_on(self.settings.table, ground, state))
 
     def _follow(self, others: list) -> None:
         """Carry the memory over to a new set of road users, by identity."""
@@ -498,9 +546,13 @@ class ShieldedEgo:
         """
         vehicle = self.vehicle
         if not self.has_contact and (vehicle.crashed or vehicle.impact is not None):
-            self._judge_contact()
+            if self.senses is None:
+                self._judge_contact()
             if self.judge is not self:
                 self.judge.check_contact()
+            if self.senses is not None:
+                for name in CONTACT:
+                    self.since[name] = self.judge.since[name]
         return self.has_contact
 
     def _judge_contact(self) -> None:

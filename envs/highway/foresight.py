@@ -51,10 +51,11 @@ def labels_of(kind: DiscreteMetaAction) -> np.ndarray:
 
 def _on_lanes(ego: ShieldedEgo, names: list[str], frames: int) -> np.ndarray:
     """Frame on which each action would first be answered, `[A]`."""
-    settings, vehicle = without_anticipation(ego.settings), ego.vehicle
+    vehicle = ego.vehicle
     before, first = vehicle.target_lane_index, np.zeros(len(names), np.int64)
     with _peeking(ego):
         ego._meet()
+        settings = without_anticipation(ego.settings)
         users, me, bend = ego._sense()
         seen, stage = Seen(me, users, *ego.last, ego.memory), make_stage(len(users))
         body = Body(*ego.body, bend.curvature, bend.slack, False)

@@ -201,7 +201,8 @@ class JunctionEgo(ShieldedEgo):
         approach, distance = road.approach_of(vehicle), road.distance_to_line(vehicle)
         if approach < 0:
             return threats
-        ahead = road.signal(approach), distance, max(vehicle.speed, 0.0), self.settings.table.ego
+        colour = road.signal(approach) if self.senses is None else self.senses.colour(road.signal(approach))
+        ahead = colour, distance, max(vehicle.speed, 0.0), self.settings.table.ego
         if self.may_pass is None:
             self.may_pass = bool(may_pass(*ahead))
         elif distance > 0.0:

@@ -28,8 +28,9 @@ class EgoMeter:
     def look(self, ego: ShieldedEgo, spent: float) -> None:
         """Take in one frame; `spent`: time that the shield took for it [s]."""
         self.spent, self.frames = self.spent + spent, self.frames + 1
-        boxes = np.array([(v.LENGTH, v.WIDTH) for v in [*ego.others, ego.vehicle]])
-        self.meter.look(ego.poses, boxes)
+        there = ego.witness
+        boxes = np.array([(v.LENGTH, v.WIDTH) for v in [*there.others, there.vehicle]])
+        self.meter.look(there.poses, boxes)
         judge = ego.judge
         if judge.settings.scheme == LANES:
             dangerous = judge.memory["since"] > 0
@@ -40,12 +41,12 @@ class EgoMeter:
 
     def info(self, ego: ShieldedEgo) -> dict[str, Any]:
         """What infos say since reset; see `ShieldWrapper`."""
-        contact = ego.judge.contact
-        if contact is not None and not self.touched and len(ego.poses) > 1:
+        contact, there = ego.judge.contact, ego.witness
+        if contact is not None and not self.touched and len(there.poses) > 1:
             self.touched = True
-            partners = [i for i in range(len(ego.others)) if ego._index_on_road(i) == contact["partner"]]
+            partners = [i for i in range(len(there.others)) if there._index_on_road(i) == contact["partner"]]
             if partners:
-                self.meter.touch(ego.poses, partners[0])
+                self.meter.touch(there.poses, partners[0])
         return {
             **self.meter.measures._asdict(),
             **{f"violation_{cause}": seconds for cause, seconds in self.violation.items()},

@@ -13,6 +13,7 @@ from rss_shield.envs.highway.egos import EgoShields
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of
 from rss_shield.envs.highway.wrapper import traffic_info
 from rss_shield.envs.options import Given, Params, check_action_type, check_kind
+from rss_shield.envs.sensing import Sensing
 from rss_shield.envs.stock import check_frequencies
 from rss_shield.shield.lanes.judge import Audit
 
@@ -32,7 +33,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
       intervention_penalty: subtracted from each agent's reward, times what `penalty_on` names of its own; from one
         reward for all, times the mean of that.
       mode, penalty_on, params, rules, record, entry, intent, waiting, traffic, examine, risk, filter, filter_at,
-        correction, evasion, judge_params, judge_rules: see `ShieldWrapper`.
+        correction, evasion, judge_params, judge_rules, sensing: see `ShieldWrapper`.
 
     Raises:
       ValueError: as `ShieldWrapper`.
@@ -64,6 +65,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         env: Any = self.env.unwrapped
         check_frequencies(env.config | ((options or {}).get("config") or {}))
         observation, info = self.env.reset(seed=seed_of(seed), options=options)
+        self._take_seed(seed_of(seed))
         self._begin()
         info.update(agents=tuple(info_of(ego) for ego in self._egos), **traffic_info(self))
         return observation, info
@@ -91,6 +93,9 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         check_agents(self.env.unwrapped)
         if self.options.replace != "frame":
             raise ValueError(f"replace = {self.options.replace!r}: expected 'frame' for several agents")
+        sensing = Sensing.of(self.options.sensing)
+        if sensing is not None and sensing.agent:
+            raise ValueError("sensing.agent = True: expected False for several agents")
 
 
 def outcome_of_agents(env: Any, actions: tuple) -> tuple[list[float], list[bool]]:

@@ -14,9 +14,11 @@ from rss_shield.envs.highway.free_ego import FreeEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.highway.open_ego import OpenSpaceEgo
 from rss_shield.envs.highway.people_ego import PeopleEgo
+from rss_shield.envs.highway.senses import Senses
 from rss_shield.envs.highway.sliding_ego import SlidingEgo
 from rss_shield.envs.options import LANES, OPEN_SPACE, Options, Settings
 from rss_shield.envs.worlds.walkers import Watched
+from rss_shield.shield.ground import Ground
 from rss_shield.shield.lanes.judge import Audit, audit
 from rss_shield.shield.tally import JUDGED, end_decision, info_at, shield_infos, start_decision
 from rss_shield.shield.verdicts import AT_FAULT
@@ -29,6 +31,8 @@ def attach(
     destination: str = "",
     takes_turns: bool = False,
     judge: Settings | None = None,
+    senses: Senses | None = None,
+    grounds: tuple[Ground | None, Ground | None] = (None, None),
 ) -> ShieldedEgo:
     """Put a shield on a vehicle.
 
@@ -38,14 +42,20 @@ def attach(
       destination: where a car goes that is steered freely and has no route; needed where roads cross.
       takes_turns: it is among compliant drivers.
       judge: what it is judged by, where that is not what it is restricted by.
+      senses: what it sees, where that is not what is there; the judge sees that.
+      grounds: what it drives on, by its own table and by the judge's, where not all of that is alike.
     """
+    if senses is not None and judge is None:
+        judge, grounds = settings, (grounds[0], grounds[0])
     if judge is not None:  # first, because the shield that acts is the one that was attached last
-        watching = attach(vehicle, judge._replace(overrides=False), record, destination)
-        ego = attach(vehicle, settings, record, destination, takes_turns)
-        ego.judge = watching
+        watching = attach(vehicle, judge._replace(overrides=False), record, destination, grounds=(grounds[1], None))
+        ego = attach(vehicle, settings, record, destination, takes_turns, grounds=(grounds[0], None))
+        ego.judge, ego.senses = watching, senses
         return ego
     if settings.scheme == LANES:
-        return (SlidingEgo if isinstance(vehicle, BicycleVehicle) else ShieldedEgo)(vehicle, settings, record)
+        ego = (SlidingEgo if isinstance(vehicle, BicycleVehicle) else ShieldedEgo)(vehicle, settings, record)
+        ego.ground = grounds[0]
+        return ego
     if settings.scheme == OPEN_SPACE:
         return OpenSpaceEgo(vehicle, settings, record)
     if not isinstance(vehicle, ControlledVehicle):

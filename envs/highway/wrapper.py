@@ -105,6 +105,14 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         (`rss_shield.envs.decisions.replacement`).
       judge_params, judge_rules: what the ego is judged by, with a memory of its own: blame, duties, cost and dangerous
         pairs. None = what it is restricted by. A sweep over response times needs one judge for all.
+      sensing: what goes wrong between the world and the shield, `rss_shield.envs.sensing.Sensing` or a dict of its
+        fields; None = it sees what is there. The judge always does, and what is measured is measured there; margins,
+        times to collision, comfort and `partner` are the shield's own.
+      conditions: of the road: "dry", "wet", "snow" or "ice", or along lanes a dict (from, to) -> one of these, in x
+        [m]; what nobody names is dry. Everybody is held to the grip there, and to the parameters that hold where it
+        will be.
+      classes: kinds of vehicles among the others, as shares: "motorcycle", "truck", "bus"; the rest are cars. Each has
+        parameters of its own (`rss_shield.shield.ground.CLASSES`). Along lanes.
 
     Raises:
       ValueError: unsupported environment, action type or mode; bad parameters; a response time
@@ -155,10 +163,11 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         env: Any = self.env.unwrapped
         check_frequencies(env.config | ((options or {}).get("config") or {}))
         observation, info = self.env.reset(seed=seed_of(seed), options=options)
+        self._take_seed(seed_of(seed))
         self._begin()
         env = self.env.unwrapped
         info.update(info_of(self._egos[0]), time=float(env.time), **traffic_info(self))
-        return observation, info
+        return self._sensed(observation), info
 
     def step(self, action):
         handed = action_of(self.action_space, action)
@@ -170,7 +179,7 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         observation, reward, terminated, truncated, info = self.env.step(handed)
         self.tell(info, reward)
         reward = reward - charge(info, self.options)
-        return observation, reward, terminated, truncated, info
+        return self._sensed(observation), reward, terminated, truncated, info
 
     def tell(self, info: dict, reward: Any) -> None:
         """Write into the info of this step what the shield says, once."""

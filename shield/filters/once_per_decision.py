@@ -33,7 +33,7 @@ def is_dangerous(ego, users, table, who=None):
       table: `Table`, whose rules do not count here.
       who: `[K]` indices of those who are near, None = everybody.
     """
-    printed = Table(table.ego, table.other, PRINTED, table.dt)
+    printed = Table(table.ego, table.other, PRINTED, table.dt, table.others)
     for a in range(how_many(who, users)):
         pair = assess(ego, users[which(who, a)], printed)
         if not (pair.safe_lon or pair.safe_lat):

@@ -10,6 +10,7 @@ from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import time_to_collision
 from rss_shield.shield.definitions.lateral import d_min_no_credit
 from rss_shield.shield.geometry import signed_gap
+from rss_shield.shield.ground import table_of, table_of_kind
 from rss_shield.shield.lanes.anticipation import acceleration_cap, farthest_bound, lateral_cap
 from rss_shield.shield.lanes.far_pairs import least_margin, own_share
 from rss_shield.shield.lanes.frame import beyond
@@ -132,13 +133,13 @@ def find_danger(
             share_ego,
             lead_ego,
             least_cos,
-            table,
+            table_of(table, user),
         )
         if (
             memory[i].since == 0
             and margin > max(worst, far)
             and not _may_be_next(ego, user, ttc, rules)
-            and not _may_bind(ego, user, margin, look)
+            and not _may_bind(ego, user, margin, look_ahead_at(look, ego, table, table.others, user.kind))
         ):
             memory[i].skipped = True
             continue
@@ -146,11 +147,11 @@ def find_danger(
         pair = assess(ego, user, table)
         remember(memory[i], pair, ego, user, dt)
         bounds = merge(bounds, memory[i], table.ego, rules, dt)
-        if rules.limits and not may_back_up(memory[i], pair):
+        if rules.limits and (not may_back_up(memory[i], pair) or (user.vague and memory[i].since > 0)):
             bounds = _hold(bounds, held)
         if memory[i].since == 0 and rules.anticipation > 0.0:
             if pair.safe_lon and not pair.safe_lat:
-                cap = min(cap, _cap_behind(pair, memory[i], table))
+                cap = min(cap, _cap_behind(pair, memory[i], table_of(table, user)))
             elif pair.safe_lat and not pair.safe_lon:
                 limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, table.ego, rules.anticipation, dt)
                 if pair.side > 0.0:
@@ -253,6 +254,14 @@ def look_ahead_of(ego, table):
     lateral += lateral_euler_margin(w, table.ego, dt) + sampling_margin(0.0, table.other, dt)
     within, horizon = farthest_bound(max(ego.speed, 0.0), table.ego, table.other, rules.anticipation, dt)
     return LookAhead(within, horizon, lateral)
+
+
+@inner
+def look_ahead_at(look, ego, table, others, kind):
+    """`LookAhead` at one road user; `look`: at those who are like `Table.other`, `others`: `Table.others`."""
+    if others is None:
+        return look
+    return look_ahead_of(ego, table_of_kind(table, others, kind))
 
 
 @compiled

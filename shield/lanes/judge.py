@@ -22,6 +22,7 @@ from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import forward_reach, speed_envelope, travel
 from rss_shield.shield.definitions.lateral import approach_no_credit
 from rss_shield.shield.definitions.response import FRONT, LAT, LON, NEITHER, lateral_speed_limit, longitudinal_response
+from rss_shield.shield.ground import table_of
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, owes, remember, role_of_ego, role_of_other
 from rss_shield.shield.lanes.pair import assess, head_on_braking, is_following
 from rss_shield.shield.sampling import euler_margin, lateral_euler_margin, sampled_approach, slowest_in_danger
@@ -81,6 +82,7 @@ def judge_motion_in(memory, ego, user, table, ahead, slack, step):
         behind the lateral speed, and `overlap_margin` is there for it.
       step: of explicit Euler [s]; 0 where cars move as cars do, and frames are only when somebody looked.
     """
+    table = table_of(table, user)
     dt = table.dt
     later = ahead * dt
     if owes(memory, LON):

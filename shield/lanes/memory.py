@@ -86,7 +86,9 @@ def remember(memory, pair, ego, user, dt):
         memory.travel_other += user.along * dt
         memory.approach_ego += memory.side * ego.u * dt + ego.half_width - memory.half_width_ego
         memory.approach_other += -memory.side * user.u * dt + user.half_width - memory.half_width_other
-    _note_situation(memory, pair, min(ego.half_width, user.half_width), user.in_own_lane)
+    _note_situation(memory, pair, min(ego.half_width, user.half_width), user)
+    if user.vague and memory.since > 0:
+        _expect_everything(memory, pair)
     memory.half_width_ego, memory.half_width_other = ego.half_width, user.half_width
     memory.acceleration_other = (user.speed - memory.speed_other) / dt if memory.age > 0 else 0.0
     memory.speed_other = user.speed
@@ -94,20 +96,38 @@ def remember(memory, pair, ego, user, dt):
     memory.skipped = False
 
 
+@inner
+def _expect_everything(memory, pair):
+    """Danger with somebody who is known within bounds only: when it truly began, and on which axis, is not known.
+
+    It is answered on both axes, toward whoever is ahead by now, and no lateral speed is granted that the ego has not
+    had since: so the answer is one for every danger that may have begun meanwhile.
+    """
+    if memory.axes != NEITHER:
+        memory.axes = LON | LAT
+    memory.ego_is_rear = memory.ego_is_rear or pair.ego_is_rear
+    if pair.side == memory.side:
+        memory.w_ego = min(memory.w_ego, pair.w_ego)
+    if pair.side == memory.side_now:
+        memory.w_side = min(memory.w_side, pair.w_ego)
+
+
 CUT_IN_SPEED = 0.1  # a car ahead is in the ego's way when it comes closer across the lane at this speed [m/s] ...
 CUT_IN_GAP = 0.3  # ... or is nearer than this across the lane [m]
 
 
 @inner
-def _note_situation(memory, pair, narrower, other_in_own_lane):
+def _note_situation(memory, pair, narrower, user):
     """Who is in the way and who is beside now, and since when; `narrower`: the smaller half width of the two [m].
+
+    Of somebody who is known within bounds only it is not known that he is neither.
 
     While danger lasts, a clock starts anew when the other gets into the ego's way, or comes up on a side.
     """
-    in_the_way = pair.ego_is_rear and (pair.w_other > CUT_IN_SPEED or pair.gap_lat < CUT_IN_GAP)
-    role = _role(in_the_way, pair.opposite, other_in_own_lane)
+    in_the_way = pair.ego_is_rear and (user.vague or pair.w_other > CUT_IN_SPEED or pair.gap_lat < CUT_IN_GAP)
+    role = _role(in_the_way, pair.opposite, user.in_own_lane)
     # who is within the other's width and apart along the lane is no neighbour: going round it is no approach
-    squarely = pair.gap_lon > 0.0 and pair.gap_lat < -narrower
+    squarely = not user.vague and pair.gap_lon > 0.0 and pair.gap_lat < -narrower
     side = 0.0 if squarely else pair.side
     begins = memory.since == 0 or memory.age == 0
     if begins or (role == FRONT) != (memory.role_now == FRONT):
@@ -143,6 +163,17 @@ def forget_safe(memory):
     if memory.since == 0:
         memory.skipped = memory.skipped or memory.age > 0
         memory.age, memory.axes = 0, NEITHER
+
+
+@compiled
+def start_over(memory):
+    """Other parameters count for a pair from here on, in place: what distances these require is nobody's doing.
+
+    Safety is found out again by them (`forget_safe`), and a danger that lasts is inherited.
+    """
+    forget_safe(memory)
+    if memory.since > 0:
+        memory.axes = NEITHER
 
 
 @compiled

@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield._numba.compiled import compiled, inner, records
 from rss_shield.shield.definitions.lateral import d_min_no_credit, d_min_of_pair
 from rss_shield.shield.definitions.longitudinal import d_min_longitudinal, is_safe_longitudinally
 from rss_shield.shield.geometry import signed_gap
+from rss_shield.shield.ground import table_of
 from rss_shield.shield.sampling import euler_margin, lateral_euler_margin, reach_from_rest, sampling_margin
 
 # One road user in the lane frame of the ego. SI units; lateral values positive to the right.
@@ -26,6 +27,8 @@ ROAD_USER = records(
         ("half_width", "f8"),
         ("in_own_lane", "?"),  # drives in a lane meant for its direction
         ("wreck", "?"),  # has crashed, or never moves: it may stop on the spot
+        ("kind", "i8"),  # row of its parameters in `Table.others`, where road users differ
+        ("vague", "?"),  # the worst of where it may be (`inflation`): what made it safe before may be either axis
     ]
 )
 
@@ -73,6 +76,7 @@ def assess(ego, user, table):
     Returns:
       `Pair`.
     """
+    table = table_of(table, user)
     rules, dt = table.rules, table.dt
     ego_is_rear = user.s >= ego.s
     opposite = user.cos < 0.0

@@ -11,7 +11,7 @@ from rss_shield.envs.fast.draws import interval
 from rss_shield.envs.fast.drivers import route_length
 from rss_shield.envs.fast.record import Unsupported
 from rss_shield.envs.fast.sight import locate
-from rss_shield.envs.fast.state import OBSTACLE
+from rss_shield.envs.fast.state import OBSTACLE, UNSEEN
 from rss_shield.envs.fast.views.record import (
     COS_D,
     COS_H,
@@ -115,7 +115,7 @@ def _find_nearest(cars, episode, lanes, sight, record):
     count = 0
     for j in range(episode.cars):
         obstacle = cars[j].kind == OBSTACLE
-        if j == episode.ego or (obstacle and not record.obstacles):
+        if j == episode.ego or cars[j].kind == UNSEEN or (obstacle and not record.obstacles):
             continue
         locate(ego.lane, j, cars, lanes, sight)
         ahead = s[j] - here

@@ -7,6 +7,7 @@ import numpy as np
 from rss_shield.envs._numpy.floats import clip, dot, not_zero
 from rss_shield.envs.fast.drivers import route_length
 from rss_shield.envs.fast.sight import locate
+from rss_shield.envs.fast.state import UNSEEN
 from rss_shield.envs.fast.views.record import TIME_TO_COLLISION, View, empty_view
 from rss_shield.envs.roads.network import Network
 from rss_shield.shield._numba.compiled import inner, part
@@ -56,7 +57,7 @@ def observe_times(cars, episode, net, sight, view, target_speeds, period, out):
                 sight.grid[v, lane, t] = 0.0
     for v in range(record.speeds):
         for j in range(episode.vehicles):
-            if j != episode.ego and target_speeds[v] != cars[j].speed:
+            if j != episode.ego and cars[j].kind != UNSEEN and target_speeds[v] != cars[j].speed:
                 locate(ego.lane, j, cars, lanes, sight)
                 _mark_collisions(cars, episode, v, j, n_lanes, net, sight, view, target_speeds, period)
     for a in range(3):
