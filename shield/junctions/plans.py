@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled, inner, records
+from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.definitions.kinematics import (
     stopping_distance,
     time_to_cover_accelerating,

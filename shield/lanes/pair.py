@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield._numba.compiled import compiled, inner, records
 from rss_shield.shield.definitions.lateral import d_min_no_credit, d_min_of_pair
 from rss_shield.shield.definitions.longitudinal import d_min_longitudinal, is_safe_longitudinally
 from rss_shield.shield.geometry import signed_gap
