@@ -1,8 +1,6 @@
 """Where a road user may be on its way: between braking at `a_max_brake` and accelerating at `a_max_accel`."""
 
-import numpy as np
-
-from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield._numba.compiled import compiled, inner, records
 from rss_shield.shield.definitions.kinematics import (
     response_distance,
     travel,
@@ -14,7 +12,7 @@ SHORT_CUT_SHARE = 0.05  # ... and at most this share of the distance driven
 _REVERSE = 1.0  # a car that reverses may go on for this long [s]
 
 # One way that a road user may take. SI units.
-THREAT = np.dtype(
+THREAT = records(
     [
         ("user", "i8"),  # index of the road user, -1 = nobody: a red light
         ("path", "i8"),  # row in `Paths`; -1 = an obstacle off all paths
@@ -40,8 +38,7 @@ THREAT = np.dtype(
         ("to_cell_beside", "i8"),
         ("arrives", "f8"),  # it is in these cells from then on only [s]
         ("yields", "?"),  # it walks around whoever has come to rest there
-    ],
-    align=True,
+    ]
 )
 
 
