@@ -34,7 +34,8 @@ def pieces_of(conditions: Any) -> list[tuple[float, str]]:
         raise ValueError(
             f"conditions = {conditions!r}: expected None, one of {', '.join(CONDITIONS)}, or a dict of ranges in x [m]"
         )
-    pieces, end = [], -math.inf
+    pieces: list[tuple[float, Any]] = []
+    end = -math.inf
     for span, name in sorted(conditions.items(), key=lambda one: _span(one[0])):
         begin, until = _span(span)
         if begin < end:

@@ -56,6 +56,7 @@ SLOW = frozenset(
         "eval/test_crossings",
         "eval/test_r157",
         "eval/test_judge_risk",
+        "eval/test_killed",
         "eval/test_learning_curve",
         "eval/test_offline_judge",
         "eval/test_paper",

@@ -484,7 +484,7 @@ class Engine:
             if seed is not None:
                 load_generator(self.batch.episodes[e], np.random.PCG64(np.random.SeedSequence(seed)))
                 if self.sensing is not None and self.batch.sensed is not None:
-                    self.batch.sensed.keys[e], self.batch.sensed.count[e] = self.sensing.keys(seed), 0
+                    self.batch.sensed.keys[e], self.batch.sensed.begun[e] = self.sensing.keys(seed), 0
 
     def reset(self, mask=None) -> Outputs:
         """Begin new episodes, in all environments or where `mask` `[E]` says so; the others stand still."""

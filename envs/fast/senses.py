@@ -28,7 +28,7 @@ class Sensed(NamedTuple):
     sensor: Sensor
     judging: Settings  # of the judge
     keys: np.ndarray  # `[E]` of the episode after a seed, ...
-    count: np.ndarray  # `[E]` ... and how many have begun since
+    begun: np.ndarray  # `[E]` ... and how many have begun since
     key: np.ndarray  # `[E]` of this episode
     cars: np.ndarray  # `[E, N + 1]` CAR as they are seen, the ghost last
     percepts: np.ndarray  # `[E, N + 1]` PERCEPT
@@ -96,8 +96,8 @@ def aware_of(e, sensed, frames):
 def begin_episode(e, sensed):
     """Errors of the next episode have a key of their own."""
     if sensed is not None:
-        sensed.key[e] = mixed(mixed(sensed.keys[e], sensed.count[e]), 0)
-        sensed.count[e] += 1
+        sensed.key[e] = mixed(mixed(sensed.keys[e], sensed.begun[e]), 0)
+        sensed.begun[e] += 1
 
 
 @rare

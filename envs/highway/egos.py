@@ -189,6 +189,7 @@ class EgoShields(gym.Wrapper):
             return observation
         env: Any = self.env.unwrapped
         (ego,) = self._egos
+        assert ego.senses is not None
         with Seen(env, ego.senses, ego.vehicle, int(ego.since["frames"])):
             return env.observation_type.observe()
 

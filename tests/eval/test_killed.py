@@ -1,0 +1,107 @@
+"""Campaigns killed (SIGKILL) at any moment: whoever goes on with them counts nothing twice and loses nothing."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from rss_shield.eval.runs.experiment import experiment_of
+from rss_shield.eval.suite import stress
+from rss_shield.eval.suite.sweep import do_task, sweep
+
+KILLS = 20
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+
+
+def in_a_child(work, seconds=None):
+    """Do something in another process, which is killed after so many seconds; was it?"""
+    child = os.fork()
+    if child == 0:
+        silence = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(silence, 1)
+        os.dup2(silence, 2)
+        try:
+            work()
+        finally:
+            os._exit(0)
+    if seconds is not None:
+        time.sleep(seconds)
+        os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    return os.WIFSIGNALED(status)
+
+
+def killed_again_and_again(work, per_piece, rng):
+    """At twenty random moments, a few pieces of work apart."""
+    killed = 0
+    for _ in range(KILLS):
+        killed += in_a_child(work, rng.uniform(0.0, 6.0) * per_piece)
+    return killed
+
+
+def contents(folder, pattern):
+    return {
+        str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob(pattern)) if path.is_file()
+    }
+
+
+@pytest.mark.parametrize("seed", [0])
+def test_a_campaign_of_stress(tmp_path, capsys, seed):
+    episodes = 120
+    few = ["--envs", "highway-fast-v0", "--policies", "random", "--block", "1", "--episodes", str(episodes)]
+    stress.run([*few, "--out", str(tmp_path / "whole")])  # compiles, too
+    said = capsys.readouterr().out.splitlines()[-4:]
+    began = time.perf_counter()
+    in_a_child(lambda: stress.run([*few, "--out", str(tmp_path / "again")]))
+    per_piece = (time.perf_counter() - began) / episodes
+
+    folder = tmp_path / "killed"
+    killed = killed_again_and_again(
+        lambda: stress.run([*few, "--out", str(folder)]), per_piece, np.random.default_rng(seed)
+    )
+    assert killed >= KILLS // 2  # others came too late: it was done
+    stress.run([*few, "--out", str(folder)])
+    assert capsys.readouterr().out.splitlines()[-4:] == said
+    assert said[0].startswith(f"{episodes} episodes")
+    assert contents(folder, "[!.]*.json") == contents(tmp_path / "whole", "[!.]*.json")
+
+
+def test_a_sweep(tmp_path):
+    grid = {"rules.anticipation": [round(0.1 * k, 1) for k in range(60)]}
+    tiny = {
+        "name": "tiny",
+        "policies": ["faster"],
+        "tests": {"episodes": 2},
+        "options": {"config": {"vehicles_count": 4, "duration": 3}},
+        "sweep": {"grid": grid},
+    }
+    experiment, known = experiment_of(tiny), {}
+
+    def work(config):
+        if not known:
+            known.update(do_task(config))
+        time.sleep(0.01)
+        with open(tmp_path / "done.txt", "a") as file:  # a line per task that was worked on
+            file.write(f"{config['options']['rules.anticipation']}\n")
+        return dict(known)
+
+    whole = sweep(experiment, tmp_path / "whole", work)
+    (tmp_path / "done.txt").unlink()
+    folder = tmp_path / "killed"
+    began = time.perf_counter()
+    in_a_child(lambda: sweep(experiment, tmp_path / "again", work))
+    per_piece = (time.perf_counter() - began) / 60
+    (tmp_path / "done.txt").unlink()
+
+    killed = killed_again_and_again(lambda: sweep(experiment, folder, work), per_piece, np.random.default_rng(1))
+    done = sweep(experiment, folder, work)
+    assert not done.failed and len(done.tasks) == len(whole.tasks) == 60
+    assert contents(folder / "tasks", "[!.]*.csv") == contents(tmp_path / "whole" / "tasks", "[!.]*.csv")
+    assert (folder / "points.csv").read_bytes() == (tmp_path / "whole" / "points.csv").read_bytes()
+    # a task may be begun again if it was killed between the work and the file, but no more often than that
+    lines = (tmp_path / "done.txt").read_text().splitlines()
+    assert set(lines) == {str(value) for value in grid["rules.anticipation"]}
+    assert len(lines) <= 60 + killed
