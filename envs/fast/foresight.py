@@ -72,11 +72,17 @@ def foresee(begin, end, sight, desk, world, batch, watch, settings, masks):
             continue
         survey(cars, episode, net, sight, world.flow)
         aware = aware_of(e, batch.sensed, world.frames)
-        if aware is None:
-            _look_ahead(e, world.frames, world.ways, cars, episode, sight, desk, world, batch, watch, settings, None)
-        else:
-            _look_ahead_as_seen(e, cars, episode, sight, desk, world, batch, watch, settings, aware)
+        _look(e, cars, episode, sight, desk, world, batch, watch, settings, aware)
         allow(desk.first, config.frames, world.labels, mask)
+
+
+@inner
+def _look(e, cars, episode, sight, desk, world, batch, watch, settings, aware):
+    """`_look_ahead` at what is there, or at what is seen; numba leaves out the other."""
+    if aware is None:
+        _look_ahead(e, world.frames, world.ways, cars, episode, sight, desk, world, batch, watch, settings, None)
+    else:
+        _look_ahead_as_seen(e, cars, episode, sight, desk, world, batch, watch, settings, aware)
 
 
 @inner

@@ -39,6 +39,7 @@ CASES = {
     "dqn": ({}, {}),
     "executed-dqn": ({}, BEFORE),
     "qr-dqn": ({}, {}),
+    "semantic-dqn": ({}, {"semantic_actions": {"features": True}}),
     "sac": ({}, {"config": {**FEW, "action": {"type": "ContinuousAction"}}}),
 }
 TOTAL = 192
