@@ -69,8 +69,8 @@ def make_vec(
       config: as for `gymnasium.make` of a highway-env environment.
       threads: of the compiled engine.
       autoreset_mode: see `FastVectorEnv`; gymnasium's, or its value as a text.
-      wrappers: put around in this order: gymnasium's `VectorWrapper`s around the whole on either backend, and wrappers
-        of single environments around each where the backend is "highway-env".
+      wrappers: put around in this order: each `VectorWrapper` of gymnasium around the whole on either backend, others
+        around each environment where the backend is "highway-env".
       semantic_actions: True, or a dict of the fields of `SemanticSettings` that differ, see `SemanticActions`.
       kwargs: `max_episode_steps`; `render_mode` (the engine knows "rgb_array"); `rules`, `intervention_penalty`,
         `penalty_on`, `entry`, `intent`, `waiting`, `examine`, `filter`, `filter_at`, `correction`, `evasion`,

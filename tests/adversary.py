@@ -481,7 +481,7 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
         for i in range(w.others):
             memory[i].age = memory[i].since = memory[i].axes = 0
             memory[i].skipped = False
-    danger = find_danger(seen, users, last[w.others], last, memory, Table(w.ego, w.other, w.rules, w.dt))
+    danger = find_danger(seen, users, last[w.others], last, memory, Table(w.ego, w.other, w.rules, w.dt, None))
     response = respond(nominal, danger, seen, BODY, w.rules, w.dt)
     result.overridden += response.overridden
     result.answered_now += (danger.response & 4) != 0
@@ -512,7 +512,7 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
 @compiled
 def _judge(command, seen, users, record, law, w, result):
     for i in range(w.others):
-        pair = assess(seen, users[i], Table(w.ego, w.other, w.published, w.dt))
+        pair = assess(seen, users[i], Table(w.ego, w.other, w.published, w.dt, None))
         remember(record[i], pair, seen, users[i], w.dt)
         if record[i].since > 0 and record[i].axes == LON:
             result.danger_lon += 1
@@ -521,7 +521,7 @@ def _judge(command, seen, users, record, law, w, result):
             result.danger_lat += 1
             result.gap_lat = min(result.gap_lat, pair.gap_lat)
         result.disputed += record[i].since != law[i].since
-    result.broken += judge_frame(seen, users, record, command, 0.0, Table(w.ego, w.other, w.published, w.dt))[1]
+    result.broken += judge_frame(seen, users, record, command, 0.0, Table(w.ego, w.other, w.published, w.dt, None))[1]
     for i in range(w.others):
         result.accused += record[i].other_broke != 0
 
@@ -598,7 +598,7 @@ def episode(rng, w, result, film):
             if now or soon:
                 _as_seen(ego, seen[0], w)
                 _as_seen(cars[1 + i], users[i], w)
-                verdict = judge_contact(seen[0], users[i], record[i], Table(w.ego, w.other, w.published, w.dt))
+                verdict = judge_contact(seen[0], users[i], record[i], Table(w.ego, w.other, w.published, w.dt, None))
                 result.contact, result.boxes, result.partner, result.verdict = frame + 1, now, i, verdict.verdict
                 result.ego_duty, result.ego_excess = verdict.ego_duty, verdict.ego_excess
                 result.other_duty, result.other_excess = verdict.other_duty, verdict.other_excess

@@ -87,7 +87,10 @@ def compile_scenario(
     if env_id not in SCENARIOS:
         raise Unsupported(f"env_id = {env_id!r}", f"one of {', '.join(SCENARIOS)}")
     scenario = SCENARIOS[env_id]
-    _check_action(scenario, env_id, config or {})
+    asked = config or {}
+    _check_action(scenario, env_id, asked)
+    if "other_vehicles_type" in asked:  # with some highway-env itself fails
+        _check_traffic(asked["other_vehicles_type"])
     wrapped = make_stock(env_id, config=config, max_episode_steps=max_episode_steps)
     env: Any = wrapped.unwrapped
     given = env.config
@@ -157,11 +160,15 @@ def _check_action(scenario: int, env_id: str, config: dict) -> None:
         )
 
 
+def _check_traffic(asked: str) -> None:
+    if asked not in KINDS and vice_of(asked) is None:
+        raise Unsupported(f"other_vehicles_type = {asked!r}", f"one of {', '.join(KINDS)}, or one of HOSTILE")
+
+
 def _checked(given: dict) -> type[IDMVehicle]:
     """The kind of the traffic, if the engine can run a configuration."""
     asked = given["other_vehicles_type"]
-    if asked not in KINDS and vice_of(asked) is None:
-        raise Unsupported(f"other_vehicles_type = {asked!r}", f"one of {', '.join(KINDS)}, or one of HOSTILE")
+    _check_traffic(asked)
     if (IDMVehicle.LENGTH, IDMVehicle.WIDTH) != (CAR_LENGTH, CAR_WIDTH):
         raise Unsupported(
             f"vehicles of {IDMVehicle.LENGTH:g} m x {IDMVehicle.WIDTH:g} m", f"{CAR_LENGTH:g} m x {CAR_WIDTH:g} m"

@@ -88,7 +88,7 @@ def test_a_response_time_that_was_asked_for_is_not_raised_silently():
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        ("slide", r"params = 'slide': expected one of simulator, intersection, slides"),
+        ("slide", r"params = 'slide': expected one of simulator, intersection, parking, slides"),
         (7.5, r"params = 7.5: expected a Preset, a pair of RSSParams"),
         ((SLIDES.ego,), r"expected a Preset, a pair of RSSParams"),
         ((SLIDES.ego, "slides"), r"params\[1\] = 'slides': expected RSSParams or a dict of them"),
