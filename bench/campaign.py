@@ -59,11 +59,14 @@ PARTS = (
     Part("intersection-off-policy", INTERSECTION, Q_LEARNERS, 200_000, 5),
 )
 TELLING = ("change-penalty-0.02", "change-penalty-0.1", "penalty-0.5", "reward-shaping", "sailr", "proactive")
+IN_ENGINE = tuple(name for name in SCRIPTED if not ARMS[name].backend)  # quick
 SHORT = (
     Part("short-highway-main", HIGHWAY, MAIN, 200_000, 5),
-    Part("short-highway-scripted", HIGHWAY, SCRIPTED, 1, 1, 200),
+    Part("short-highway-scripted", HIGHWAY, IN_ENGINE, 1, 1),
+    Part("short-highway-idm", HIGHWAY, ("idm",), 1, 1, 200),
     Part("short-intersection-main", INTERSECTION, MAIN, 100_000, 3),
-    Part("short-intersection-scripted", INTERSECTION, SCRIPTED, 1, 1, 200),
+    Part("short-intersection-scripted", INTERSECTION, IN_ENGINE, 1, 1),
+    Part("short-intersection-idm", INTERSECTION, ("idm",), 1, 1, 200),
     Part("short-highway-others", HIGHWAY, (*TELLING, "distance-45m", "literal-def10"), 200_000, 3),
     Part("short-highway-off-policy", HIGHWAY, (*Q_LEARNERS, *CONTINUOUS), 50_000, 3),
 )
