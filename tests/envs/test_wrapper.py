@@ -209,7 +209,6 @@ def test_an_agent_that_drives_into_the_car_ahead_is_blamed_with_evidence():
     [
         ({"shield": "mask"}, r"shield = 'mask': expected 'override', 'monitor' or None"),
         ({"env_id": "nowhere-v0"}, r"env_id = 'nowhere-v0'"),
-        ({"env_id": "racetrack-v0"}, r"RacetrackEnv is not supported; expected one of highway-v0"),
         ({"entry": "bold"}, r"entry = 'bold': expected one of cautious, priority, assertive"),
         ({"intent": "none"}, r"intent = 'none': expected one of known, straight, any"),
         ({"waiting": "inside"}, r"waiting = 'inside': expected one of line, anywhere"),

@@ -23,7 +23,7 @@ def test_the_greedy_policy_comes_nearest_and_leaves_no_trace_of_its_trials():
     before = [array.copy() for array in _arrays(env.engine)]
     chosen = policy_of("greedy", lambda: env, np.random.default_rng(0))(seen)
     for old, new in zip(before, _arrays(env.engine), strict=True):
-        assert old.tobytes() == new.tobytes()
+        assert repr(old.tolist()) == repr(new.tolist())  # what lies between the fields of records is anything
     # what every action would lead to, tried out on environments of their own
     margins = np.empty((5, 8))
     for action in range(5):
@@ -75,7 +75,7 @@ def test_the_judge_says_of_every_contact_what_the_shield_says(env_id, traffic):
 
 
 def test_what_steers_freely_is_played_again_on_highway_env_to_the_same_contact(tmp_path):
-    block = Block("highway-fast-v0", "wild", "", "monitor", 0, 4, "rammer")
+    block = Block("highway-fast-v0", "wild", "", "monitor", 0, 12, "mixed")
     worst = min(play(block)["bad"], key=lambda one: len(one["actions"]))
     assert keep_trace(block, worst["seed"], worst["actions"], tmp_path / "bad.npz") == worst["blame"]
     assert load(tmp_path / "bad.npz").meta["config"]["action"]["type"] == "ContinuousAction"

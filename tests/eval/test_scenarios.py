@@ -38,7 +38,8 @@ def test_the_distances_at_the_head_of_the_catalogue():
 def test_a_wrong_derivation_is_noticed():
     wrong = dataclasses.replace(SCENARIOS[2], on="other", danger=2.5)
     outcome = outcome_of(wrong)
-    assert [difference.split(":")[0] for difference in outcome.differences] == ["verdict with the shield", "danger"]
+    named = ["verdict with the shield", "verdict with evasion", "danger"]
+    assert [difference.split(":")[0] for difference in outcome.differences] == named
     assert "**differs**" in page_of([outcome])
 
 
