@@ -31,7 +31,7 @@ SCRIPTED = tuple(arm.name for arm in ARMS.values() if arm.scripted)
 PENALTIES = tuple(name for name in ARMS if "penalty-0" in name or name == "penalty-1")
 VARIANTS = ("reward-shaping", "adaptive-share", "proactive", "executed-action", "sailr")
 FILTERS = ("ttc", "distance-45m", "cbf", "limits", "literal-def10")  # along lanes only
-Q_LEARNERS = ("dqn", "dqn-shielded", "executed-action-dqn", "qr-dqn", "qr-dqn-shielded")
+Q_LEARNERS = ("dqn", "dqn-shielded", "executed-action-dqn", "qr-dqn", "qr-dqn-shielded", "semantic-dqn")
 CONTINUOUS = ("sac", "sac-replaced", "sac-projected")  # in the engine on motorways only
 LONG = 30  # [s] of an episode at the intersection
 

@@ -18,7 +18,7 @@ TINY = ["--", "--n-envs", "2", "--replay-episodes", "0", "--workers", "1", "--re
 def test_every_arm_is_in_the_campaign():
     on_highway = {arm for part in PARTS for arm in part.arms if part.env_id == "highway-fast-v0"}
     assert on_highway == set(ARMS)
-    assert set(SCRIPTED) == {"lazy", "slower", "random", "idm"}
+    assert set(SCRIPTED) >= {"lazy", "slower", "random", "idm"}
     assert len({part.name for part in PARTS}) == len(PARTS)
 
 
