@@ -62,7 +62,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--seeds -1", "--seeds -1 is out of range: expected different whole numbers"),
         (
             "--preset fast",
-            "--preset fast is out of range: expected one of auto, simulator, intersection, slides, ad-rss",
+            "--preset fast is out of range: expected one of auto, simulator, intersection, parking, slides, ad-rss",
         ),
         ("--rules.anticipation -1", "--rules.anticipation = -1.0: expected a finite number >= 0"),
         ("--rules.heading-bound 2", "--rules.heading_bound = 2.0: expected a finite number >= 0 and <= 1"),
@@ -86,10 +86,6 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--env-id no-such-road", "'no-such-road'"),
         ("--env-id CartPole-v1", "CartPole"),
         ("--env-id CartPole-v1 --backend highway-env", "CartPole"),
-        (
-            "--env-id racetrack-v0 --backend highway-env",
-            "environment RacetrackEnv is not supported; expected one of highway-v0",
-        ),
         ("--env-id intersection-multi-agent-v0 --backend highway-env", "actions Tuple(Discrete(3), Discrete(3)); "),
         ("--ego.mu -1", "--ego: mu = -1.0 is out of range: expected a finite number >= 0"),
         ("--other.a-min-brake 7", "--other: a_min_brake = 7 is out of range: expected at most a_max_brake = 6"),
