@@ -479,6 +479,6 @@ def test_resuming_a_finished_run_with_its_options_or_none_repeats_only_the_repor
     before = (folder / "table.csv").read_bytes()
     began = time.perf_counter()
     call(monkeypatch, *options.split(), "--runs-dir", str(folder.parent), "--name", "whole", "--resume")
-    assert time.perf_counter() - began < 90  # nothing is trained again, on a busy machine either
+    assert time.perf_counter() - began < 20
     assert "95 % interval" in " ".join(capsys.readouterr().out.split())
     assert (folder / "table.csv").read_bytes() == before

@@ -429,8 +429,8 @@ def _stands_out(paths, ways, i, car):
 @compiled
 def _fitting(roads, car, expected):
     """Lanes that a car may be driving on by its pose, of those expected if there are any; sets of bits."""
-    lanes = 0
-    for among in (expected, (1 << len(roads.lanes)) - 1):
+    lanes, everywhere = 0, (1 << len(roads.lanes)) - 1
+    for among in (expected & everywhere, everywhere):  # `_ALL` has more bits than there are lanes
         if lanes != 0:
             break
         while among != 0:

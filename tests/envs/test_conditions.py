@@ -112,7 +112,7 @@ def test_both_simulators_drive_on_the_same_ground(sensing):
         for _ in range(40):
             observations, rewards, _, _, infos = envs.step(rng.choice([0, 1, 2, 3, 3, 3, 4], 2))
             shield = infos["shield"]
-            rows += [observations, rewards, infos["speed"], shield["override_fraction"]]  # open: dangerous_pairs
+            rows += [observations, rewards, infos["speed"], shield["override_fraction"], shield["dangerous_pairs"]]
             rows.append(infos["blame"])
         told.append(rows)
     for value, other in zip(*told, strict=True):

@@ -135,10 +135,14 @@ def test_what_other_sources_left_in_the_cache_is_not_read(tmp_path):
 
 
 @pytest.mark.parametrize("env_id", ["highway-fast-v0", "intersection-v0", "roundabout-v0"])
-def test_one_kernel_runs_with_the_shield_and_without(env_id):
-    shielded, bare = (rss_shield.make_vec(env_id, 2, shield=mode).engine for mode in ("override", None))
+def test_one_kernel_runs_whether_the_shield_acts_or_watches_and_another_without(env_id):
+    shielded, watched, bare = (
+        rss_shield.make_vec(env_id, 2, shield=mode).engine for mode in ("override", "monitor", None)
+    )
     for part in ("world", "batch", "film", "settings"):
-        assert numba.typeof(getattr(shielded, part)) == numba.typeof(getattr(bare, part)), part
+        assert numba.typeof(getattr(shielded, part)) == numba.typeof(getattr(watched, part)), part
+    # nothing of a shield is compiled where there is none: its memory is absent
+    assert bare.batch.past is bare.batch.crossings is bare.batch.rides is bare.world.frames is bare.world.ways is None
 
 
 def test_the_smaller_and_the_larger_are_those_of_numpy():
