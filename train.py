@@ -177,8 +177,8 @@ class Config:
     """Test episodes per trained model and test condition, on the same seeds for all."""
     replay_episodes: int = 5
     """How many of these are played again on the original simulator and compared; none if it is the backend."""
-    no_pages: bool = False
-    """Leave out the pages on which the worst and the most typical episode of each arm play, in runs-dir/NAME/pages."""
+    pages: bool = True
+    """Write pages on which the worst and the most typical episode of each arm play, into runs-dir/NAME/pages."""
     removal_checks: int = 10
     """How often an agent is tested with and without the shield on its way through training, at most; 0: never."""
     removal_episodes: int = 50
@@ -226,7 +226,7 @@ def main(arguments: list[str]) -> None:
         played = [cell for cell in cells if in_engine(ARMS[cell[0]])]
         unchecked = [cell for cell in played if not replay_path(folder, *cell).exists()]
         run_jobs([replaying(config, preset, folder, *cell) for cell in unchecked], config.workers)
-    if not config.no_pages:
+    if config.pages:
         run_jobs([showing(config, preset, folder, arm) for arm in config.arms if in_engine(ARMS[arm])], config.workers)
 
     write_report(folder)

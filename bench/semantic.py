@@ -62,8 +62,7 @@ class Config:
 def run(env_id: str, config: Config) -> Path:
     """Train and test every arm on one road, or go on with it; returns the folder."""
     numbers = {"--total-timesteps": config.timesteps, "--eval-episodes": config.episodes, "--n-envs": config.n_envs}
-    fixed = ["--replay-episodes", "0", "--removal-checks", "0", "--workers", "1"]
-    fixed += [] if (config.out / env_id / "config.json").exists() else ["--no-pages"]  # which a run remembers
+    fixed = ["--replay-episodes", "0", "--removal-checks", "0", "--workers", "1", "--no-pages"]
     words = ["--env-id", env_id, "--arms", *config.arms, "--seeds", *map(str, config.seeds)]
     words += [word for name, value in numbers.items() for word in (name, str(value))]
     train.main([*words, *fixed, "--runs-dir", str(config.out), "--name", env_id, "--resume"])

@@ -31,14 +31,7 @@ def parsed(kind: type[T], prog: str, description: str, arguments: list[str], def
     given: dict[str, Any] = {} if default is None else {"default": default}
     try:
         with contextlib.redirect_stderr(printed):
-            return tyro.cli(
-                kind,
-                prog=prog,
-                description=description,
-                args=arguments,
-                config=(tyro.conf.FlagCreatePairsOff,),
-                **given,
-            )
+            return tyro.cli(kind, prog=prog, description=description, args=arguments, **given)
     except SystemExit as stop:
         if not stop.code:  # --help
             raise
