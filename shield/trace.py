@@ -191,6 +191,12 @@ def users_of(
     )
 
 
+def stretches(on: np.ndarray) -> list[tuple[int, int]]:
+    """[start, end) of each stretch of a series `[T]` of bool that is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
 def ego_of(user: int, samples: int, areas: int = 0) -> Ego:
     """An `Ego` of which nothing is known yet; its arrays are there to be filled in."""
 

@@ -36,6 +36,7 @@ from rss_shield.shield.trace import (
     Light,
     Trace,
     ego_of,
+    stretches,
     users_of,
 )
 from rss_shield.shield.verdicts import VERDICTS
@@ -392,9 +393,8 @@ def _areas(scene: Any) -> tuple[np.ndarray, list[int]]:
             low, high, low_2, high_2 = paths.conflicts[track.path, threat["path"], first:last].T
             at = threat["s"] - threat["half_length"]
             hit = (np.isfinite(low) & (high >= at)) | (np.isfinite(low_2) & (high_2 >= at))
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], hit, [False]])))
-        for start, end in edges.reshape(-1, 2) + first:
-            found[float(start * CELL), float(end * CELL), int(threat["user"])] = None
+        for a, b in stretches(hit):
+            found[float((first + a) * CELL), float((first + b) * CELL), int(threat["user"])] = None
     area, users = np.full((AREAS, 2), np.nan), [-1] * AREAS
     for k, (start, end, user) in enumerate(sorted(found)[:AREAS]):
         area[k], users[k] = (start, end), user
@@ -409,8 +409,7 @@ def _events(trace: Trace, noted: list[Event], hit: dict[int, int]) -> tuple[Even
             ("danger", ego.dangerous, ego.response),
             ("response", ego.changed_by == CHANGED_BY.index("response"), ego.response),
         ):
-            edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]])))
-            for start, end in edges.reshape(-1, 2):
+            for start, end in stretches(on):
                 partner = int(ego.partner[start])
                 events.append(
                     Event(float(trace.time[start]), f"{name} begins", ego.user, partner, RESPONSES[text[start]])

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from rss_shield.eval.plots import STYLE, save
-from rss_shield.shield.trace import CHANGED_BY, SIDES, Ego, Trace
+from rss_shield.eval.viewer.from_above import box_at, draw_from_above
+from rss_shield.shield.trace import CHANGED_BY, SIDES, Ego, Trace, stretches
 
 MOMENTS = 5
 EGO, PARTNER, OTHERS = "#0072B2", "#D55E00", "#999999"
@@ -41,8 +42,7 @@ def key_moments(trace: Trace, ego: Ego) -> list[int]:
 
 def longest_response(ego: Ego) -> tuple[int, int] | None:
     """First sample of the longest stretch on which a proper response changed the command, and the one after it."""
-    stretches = _stretches(ego.changed_by == RESPONSE)
-    return max(stretches, key=lambda stretch: stretch[1] - stretch[0]) if stretches else None
+    return max(stretches(ego.changed_by == RESPONSE), key=lambda stretch: stretch[1] - stretch[0], default=None)
 
 
 def margins_of(ego: Ego) -> np.ndarray:
@@ -85,27 +85,15 @@ def write_filmstrip(traces: Sequence[Trace], labels: Sequence[str], path: Path, 
 
 def _from_above(axes: Any, trace: Trace, ego: Ego, t: int) -> None:
     u, me = trace.users, ego.user
-    for lane in trace.lanes:
-        x, y, heading = lane.centre.T
-        for side in (-0.5, 0.5):
-            off = side * lane.width
-            axes.plot(x - off * np.sin(heading), y + off * np.cos(heading), color="#cccccc", lw=0.6)
     required = ego.required[t, AHEAD]
     if np.isfinite(required) and required > 0.0:
-        band = _box(u.x[t, me], u.y[t, me], u.heading[t, me], required, u.width[me], 0.5 * (u.length[me] + required))
+        band = box_at(u.x[t, me], u.y[t, me], u.heading[t, me], required, u.width[me], 0.5 * (u.length[me] + required))
         axes.add_patch(Polygon(band, color=EGO, alpha=0.2, lw=0))
-    for k in np.flatnonzero(u.present[t]):
-        colour = EGO if k == me else PARTNER if k == ego.partner[t] else OTHERS
-        axes.add_patch(
-            Polygon(_box(u.x[t, k], u.y[t, k], u.heading[t, k], u.length[k], u.width[k]), color=colour, lw=0)
-        )
+    draw_from_above(axes, trace, t, lambda k: EGO if k == me else PARTNER if k == ego.partner[t] else OTHERS)
     x, y = u.x[t, me], u.y[t, me]
     across = 0.55 * REACH
     axes.set_xlim(x - REACH, x + REACH)
     axes.set_ylim(y + across, y - across)  # y grows to the right of x
-    axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
     axes.set_title(f"{trace.time[t]:.1f} s{_said(trace, ego, t)}", fontsize=7)
 
 
@@ -118,13 +106,6 @@ def _said(trace: Trace, ego: Ego, t: int) -> str:
     return f", {changed}" if changed else ""
 
 
-def _box(x: float, y: float, heading: float, length: float, width: float, ahead: float = 0.0) -> np.ndarray:
-    """`[4, 2]` corners of a rectangle whose middle is `ahead` of a point."""
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [0.5 * length, 0.5 * width] + [ahead, 0.0]
-    c, s = np.cos(heading), np.sin(heading)
-    return corners @ np.array([[c, s], [-s, c]]) + [x, y]
-
-
 def _margins(axes: Any, trace: Trace, ego: Ego, moments: list[int], label: str, latest: float) -> None:
     margins, drawn = margins_of(ego), False
     for k, (side, colour) in enumerate(zip(SIDES, SIDE_COLOURS, strict=True)):
@@ -135,7 +116,7 @@ def _margins(axes: Any, trace: Trace, ego: Ego, moments: list[int], label: str, 
     if np.isfinite(room).any():
         axes.plot(trace.time, room, color="black", lw=1.0, label="way to the first place in somebody's way")
         drawn = True
-    for start, end in _stretches(ego.changed_by == RESPONSE):
+    for start, end in stretches(ego.changed_by == RESPONSE):
         axes.axvspan(trace.time[start], trace.time[end - 1] + trace.dt, color=PARTNER, alpha=0.15, lw=0)
     for contact in trace.contacts:
         if ego.user in (contact.user, contact.partner):
@@ -152,8 +133,3 @@ def _margins(axes: Any, trace: Trace, ego: Ego, moments: list[int], label: str, 
     axes.tick_params(labelsize=7)
     if drawn:
         axes.legend(loc="upper right", ncols=4, fontsize=7)
-
-
-def _stretches(on: np.ndarray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], on, [0]]).astype(int)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -7,10 +7,10 @@ import numpy as np
 
 from rss_shield.eval.suite.judge.lanes import Seen, see_all, table_of
 from rss_shield.eval.suite.judge.plans import see_junction
-from rss_shield.eval.suite.judge.smoothing import EXACT, SURE, Noise, filled_in, stretches
+from rss_shield.eval.suite.judge.smoothing import EXACT, SURE, Noise, filled_in
 from rss_shield.shield.definitions.response import AXES, LAT, LON
 from rss_shield.shield.params import Preset, Rules, Table
-from rss_shield.shield.trace import Trace
+from rss_shield.shield.trace import Trace, stretches
 from rss_shield.shield.verdicts import DUTIES, KEPT, VERDICTS, weight_of
 
 

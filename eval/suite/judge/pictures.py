@@ -8,12 +8,12 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
 
 from rss_shield.eval.files import atomic
 from rss_shield.eval.suite.judge.findings import blame_line, danger_line
 from rss_shield.eval.suite.judge.judgement import Judgement
-from rss_shield.eval.suite.judge.smoothing import stretches
+from rss_shield.eval.viewer.from_above import draw_from_above
+from rss_shield.shield.trace import stretches
 
 USER, PARTNER, OTHERS, DANGER, BROKEN = "#0072b2", "#e69f00", "#999999", "#f6d5c5", "#c0392b"
 _KEY_FRAMES = 5
@@ -163,24 +163,12 @@ def _shade(axes: Any, judgement: Judgement, i: int, j: int) -> None:
 
 def _from_above(axes: Any, judgement: Judgement, i: int, j: int, t: int) -> None:
     trace, u = judgement.trace, judgement.trace.users
-    for lane in trace.lanes:
-        x, y, heading = lane.centre.T
-        for side in (-0.5, 0.5):
-            off = side * lane.width
-            axes.plot(x - off * np.sin(heading), y + off * np.cos(heading), color="#cccccc", lw=0.6)
-    for k in np.flatnonzero(u.present[t]):
-        colour = USER if k == i else PARTNER if k == j else OTHERS
-        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [u.length[k] / 2, u.width[k] / 2]
-        c, s = np.cos(u.heading[t, k]), np.sin(u.heading[t, k])
-        axes.add_patch(Polygon(corners @ np.array([[c, s], [-s, c]]) + [u.x[t, k], u.y[t, k]], color=colour, lw=0))
+    draw_from_above(axes, trace, t, lambda k: USER if k == i else PARTNER if k == j else OTHERS)
     middle = np.nanmean(u.x[t, [i, j]]), np.nanmean(u.y[t, [i, j]])
     apart = np.nan_to_num(np.hypot(*(np.diff(v[t, [i, j]])[0] for v in (u.x, u.y))))
     reach = float(np.clip(0.75 * apart + 8.0, 12.0, _AROUND))
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
     axes.set_ylim(middle[1] + reach, middle[1] - reach)  # y grows to the right of x
-    axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
     axes.set_title(f"{trace.time[t]:.2f} s, {2 * reach:.0f} m", fontsize=8)
 
 

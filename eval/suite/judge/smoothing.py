@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from rss_shield.shield.trace import Trace
+from rss_shield.shield.trace import Trace, stretches
 from rss_shield.shield.verdicts import DUTIES
 
 WINDOW = 1.1  # length of the fit: long enough for NGSIM's noise, short enough to see a braking begin [s]
@@ -94,9 +94,3 @@ def noise_of(left: list[np.ndarray], dt: float) -> Noise:
         float(np.linalg.norm(savgol_coeffs(window, ORDER, deriv=order, delta=dt))) * sigma for order in (1, 2)
     )
     return Noise(sigma, speed, acceleration)
-
-
-def stretches(present: np.ndarray) -> list[tuple[int, int]]:
-    """[start, end) of each stretch of a series `[T]` of bool that is True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]])))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -23,7 +23,7 @@ from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame_
 from rss_shield.shield.lanes.judge import Log
 from rss_shield.shield.lanes.pair import ROAD_USER
 from rss_shield.shield.params import Table
-from rss_shield.shield.trace import Lane, Trace, straight_lane
+from rss_shield.shield.trace import Lane, Trace, straight_lane, stretches
 
 _OPEN = 1000.0  # a log without lanes has one along its users, and so much longer at either end [m]
 
@@ -114,9 +114,7 @@ def views(world: World, i: int, table: Table, slip: np.ndarray) -> list[View]:
       table: `Table` in force; how far roads matter depends on it.
       slip: `[T, N]` angle between heading and motion during the frame, NaN = not known [rad].
     """
-    present = world.trace.users.present[:, i]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]])))
-    return [_view(world, i, a, b, table, slip) for a, b in edges.reshape(-1, 2)]
+    return [_view(world, i, a, b, table, slip) for a, b in stretches(world.trace.users.present[:, i])]
 
 
 def _view(world, i: int, start: int, end: int, table: Table, slip) -> View:
