@@ -84,6 +84,12 @@ class Unsupported(ValueError):
         super().__init__(f"the fast engine does not support {what}; expected {expected}")
 
 
+def set_scale(record: Any, given: Mapping[str, Any], low: float, high: float) -> None:
+    """Enter whether and from what range a reward is scaled, and the speeds that are worth nothing and all."""
+    record["normalize_reward"], record["reward_low"], record["reward_high"] = given["normalize_reward"], low, high
+    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+
+
 def set_weights(record: Any, given: Mapping[str, Any], names: tuple[str, ...]) -> None:
     """Enter what the components of a reward weigh; one that the configuration does not know weighs nothing."""
     for k, name in enumerate(names):

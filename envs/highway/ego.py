@@ -106,6 +106,16 @@ def log_of(frames: list[Frame]) -> Log:
 DECISION, EPISODE = records(DECISION_FIELDS), records(EPISODE_FIELDS)
 
 
+def carried_over(rows: np.ndarray, before: list, now: list) -> np.ndarray:
+    """Records `[N]` of everybody who is there now: those of before, by identity, and zeros of who is new."""
+    known = {id(other): i for i, other in enumerate(before)}
+    result = np.zeros(len(now), rows.dtype)
+    for i, other in enumerate(now):
+        if id(other) in known:
+            result[i] = rows[known[id(other)]]
+    return result
+
+
 class ShieldedEgo:
     """The shield on one controlled vehicle. It takes the place of the vehicle's `act`.
 

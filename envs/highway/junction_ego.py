@@ -3,7 +3,7 @@
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
-from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo
+from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo, carried_over
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.paths import Size, size_of
 from rss_shield.envs.roads.slip import slip_of
@@ -245,12 +245,7 @@ class JunctionEgo(ShieldedEgo):
             self.crossings[threat["user"]]["relied"] = True
 
     def _follow(self, others: list) -> None:
-        old = {id(other): i for i, other in enumerate(self.others)}
-        crossings = np.zeros(len(others), CROSSING)
-        for i, other in enumerate(others):
-            if id(other) in old:
-                crossings[i] = self.crossings[old[id(other)]]
-        self.crossings = crossings
+        self.crossings = carried_over(self.crossings, self.others, others)
         super()._follow(others)
         # what never drives takes no path
         own = self.junction.sizes[0]

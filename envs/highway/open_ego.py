@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 
-from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo
+from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo, carried_over
 from rss_shield.envs.options import Settings
 from rss_shield.shield.comfort import ride_on
 from rss_shield.shield.command import Command
@@ -74,13 +74,8 @@ class OpenSpaceEgo(ShieldedEgo):
         return users
 
     def _follow(self, others: list) -> None:
-        old = {id(other): i for i, other in enumerate(self.others)}
-        pairs, users = np.zeros(len(others), PAIR), np.zeros(len(others) + 1, USER)
-        users[-1] = self.users[-1]
-        for i, other in enumerate(others):
-            if id(other) in old:
-                pairs[i], users[i] = self.pairs[old[id(other)]], self.users[old[id(other)]]
-        self.pairs, self.users = pairs, users
+        self.pairs = carried_over(self.pairs, self.others, others)
+        self.users = np.append(carried_over(self.users[:-1], self.others, others), self.users[-1:])  # the ego is last
         super()._follow(others)
 
     def _verdicts(self, touching: list[int]) -> list[Verdict]:

@@ -6,6 +6,7 @@ pedestrians' ways are threats beside those of cars; plans, controller and judge 
 
 import numpy as np
 
+from rss_shield.envs.highway.ego import carried_over
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.ways import CAR_ON_ROAD
@@ -48,12 +49,7 @@ class PeopleEgo(JunctionEgo):
             road.vehicles, road.objects = kept
 
     def _follow(self, others: list) -> None:
-        old = {id(other): i for i, other in enumerate(self.others)}
-        watched = np.zeros(len(others), WATCHED)
-        for i, other in enumerate(others):
-            if id(other) in old:
-                watched[i] = self.watched[old[id(other)]]
-        self.watched = watched
+        self.watched = carried_over(self.watched, self.others, others)
         super()._follow(others)
         self.people = [i for i, other in enumerate(others) if isinstance(other, Walker)]
 

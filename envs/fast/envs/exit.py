@@ -7,7 +7,7 @@ import numpy as np
 from rss_shield.envs._numpy.floats import clip
 from rss_shield.envs.fast.draws import random
 from rss_shield.envs.fast.rating import lane_meant, normalized, scaled, weigh
-from rss_shield.envs.fast.record import set_weights
+from rss_shield.envs.fast.record import set_scale, set_weights
 from rss_shield.envs.fast.spawning import add_ego, add_on_lane, ahead_of_all
 from rss_shield.envs.roads.network import heading_at, position
 from rss_shield.shield._numba.compiled import inner, part
@@ -24,9 +24,7 @@ def describe(record: Any, given: dict, env: Any, number: dict) -> None:
     record["lanes_factor"] = np.exp(-5 / 40 * given["lanes_count"])
     record["goal_lane"] = number["1", "2", given["lanes_count"]]
     record["other_goal_lane"] = number["2", "exit", 0]
-    record["normalize_reward"] = given["normalize_reward"]
-    record["reward_low"], record["reward_high"] = given["collision_reward"], given["goal_reward"]
-    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    set_scale(record, given, given["collision_reward"], given["goal_reward"])
     set_weights(record, given, REWARDS)
 
 

@@ -8,7 +8,7 @@ from rss_shield.envs._numpy.floats import clip
 from rss_shield.envs.fast.draws import integers, uniform
 from rss_shield.envs.fast.linear_drivers import randomize
 from rss_shield.envs.fast.rating import lane_meant, normalized, scaled, weigh
-from rss_shield.envs.fast.record import set_weights
+from rss_shield.envs.fast.record import set_scale, set_weights
 from rss_shield.envs.fast.spawning import add_ego, add_on_lane, ahead_of_all
 from rss_shield.envs.roads.network import heading_at, position
 from rss_shield.shield._numba.compiled import inner, part
@@ -25,10 +25,7 @@ def describe(record: Any, given: dict, env: Any, number: dict) -> None:
     record["ego_lane"] = -1 if asked is None else range(given["lanes_count"])[asked]
     record["ego_spacing"], record["traffic_spacing"] = given["ego_spacing"], 1 / given["vehicles_density"]
     record["lanes_factor"] = np.exp(-5 / 40 * given["lanes_count"])
-    record["normalize_reward"] = given["normalize_reward"]
-    record["reward_low"] = given["collision_reward"]
-    record["reward_high"] = given["high_speed_reward"] + given["right_lane_reward"]
-    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    set_scale(record, given, given["collision_reward"], given["high_speed_reward"] + given["right_lane_reward"])
     set_weights(record, given, REWARDS)
 
 

@@ -9,7 +9,7 @@ from rss_shield.envs.fast.draws import integers, normal, random, two_of
 from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.linear_drivers import randomize
 from rss_shield.envs.fast.rating import normalized, scaled, weigh
-from rss_shield.envs.fast.record import FLOW, Unsupported, set_weights
+from rss_shield.envs.fast.record import FLOW, Unsupported, set_scale, set_weights
 from rss_shield.envs.fast.sight import sort_along_x
 from rss_shield.envs.fast.spawning import add_ego, add_on_lane
 from rss_shield.envs.roads.network import heading_at, local_coordinates, position
@@ -35,9 +35,7 @@ def describe(record: Any, given: dict, env: Any, number: dict) -> None:
     record["main_lane"] = number["o0", "ir0", 0]
     record["traffic"] = given["initial_vehicle_count"]
     record["offroad_terminal"] = given["offroad_terminal"]
-    record["normalize_reward"] = given["normalize_reward"]
-    record["reward_low"], record["reward_high"] = given["collision_reward"], given["arrived_reward"]
-    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    set_scale(record, given, given["collision_reward"], given["arrived_reward"])
     set_weights(record, given, REWARDS)
 
 

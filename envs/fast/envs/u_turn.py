@@ -6,7 +6,7 @@ from rss_shield.envs._numpy.floats import clip
 from rss_shield.envs.fast.draws import normal
 from rss_shield.envs.fast.linear_drivers import randomize
 from rss_shield.envs.fast.rating import normalized, scaled, weigh
-from rss_shield.envs.fast.record import set_weights
+from rss_shield.envs.fast.record import set_scale, set_weights
 from rss_shield.envs.fast.spawning import add_ego, add_on_lane
 from rss_shield.envs.roads.network import position
 from rss_shield.shield._numba.compiled import inner, part
@@ -19,10 +19,7 @@ def describe(record: Any, given: dict, env: Any, number: dict) -> None:
     """Enter a configuration; `number` is that of each lane of `env`."""
     record["main_lane"], record["side_lane"] = number["a", "b", 0], number["b", "c", 0]
     record["other_lane"] = number["c", "d", 0]
-    record["normalize_reward"] = given["normalize_reward"]
-    record["reward_low"] = given["collision_reward"]
-    record["reward_high"] = given["high_speed_reward"] + given["left_lane_reward"]
-    record["speed_low"], record["speed_high"] = given["reward_speed_range"]
+    set_scale(record, given, given["collision_reward"], given["high_speed_reward"] + given["left_lane_reward"])
     set_weights(record, given, REWARDS)
 
 
