@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from rss_shield.eval.runs.experiment import Experiment
 
 FILES = (".yaml", ".yml", ".toml", ".json")
-FIRST_TEST_SEED = 10**9  # of train.py
 TAKES_FILES = ("train", "test", "report")
 
 
@@ -36,7 +35,7 @@ def expanded(command: str, arguments: list[str]) -> list[list[str]]:
     experiment, runs_dir = read_experiment(file), runs_dir_in(more)
     if command == "report":
         return [[*map(str, existing(file, experiment, runs_dir)), *without_runs_dir(more)]]
-    if experiment.policies or experiment.points or experiment.grid or experiment.drawn:
+    if experiment.is_sweep:
         raise ValueError(
             f"{file} has {'policies' if experiment.policies else 'a sweep'}: rss-shield sweep {file} runs it"
         )
@@ -54,14 +53,13 @@ def run_folder(experiment: "Experiment", env_id: str) -> str:
 
 def train_words(file: str, experiment: "Experiment", env_id: str) -> list[str]:
     """The options of `rss-shield train` for one environment of an experiment."""
-    from rss_shield.eval.runs.experiment import as_words
+    from rss_shield.eval.runs.experiment import training_words
 
-    if experiment.tests["first_seed"] != FIRST_TEST_SEED:
-        found = experiment.tests["first_seed"]
-        raise ValueError(f"{file}: tests.first_seed = {found}: expected {FIRST_TEST_SEED} where arms train")
-    words = ["--env-id", env_id, "--name", run_folder(experiment, env_id), "--resume"]
-    words += ["--arms", *experiment.arms, "--seeds", *map(str, experiment.seeds)]
-    return [*words, "--eval-episodes", str(experiment.tests["episodes"]), *as_words(experiment.options)]
+    try:
+        words = training_words(env_id, experiment.arms, experiment.seeds, experiment.tests, experiment.options)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from None
+    return ["--name", run_folder(experiment, env_id), "--resume", *words]
 
 
 def existing(file: str, experiment: "Experiment", runs_dir: Path) -> list[Path]:
@@ -73,7 +71,7 @@ def existing(file: str, experiment: "Experiment", runs_dir: Path) -> list[Path]:
     names = dict.fromkeys([experiment.name, *(run_folder(experiment, env_id) for env_id in experiment.environments)])
     found = [runs_dir / name for name in names if (runs_dir / name).is_dir()]
     if not found:
-        what = "sweep" if experiment.policies or experiment.points or experiment.grid or experiment.drawn else "train"
+        what = "sweep" if experiment.is_sweep else "train"
         raise ValueError(f"{file}: nothing in {runs_dir / experiment.name} yet; rss-shield {what} {file} comes first")
     return found
 

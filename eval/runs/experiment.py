@@ -1,7 +1,7 @@
 """An experiment is a file that names environments, arms or policies, seeds, budgets, tests, and what is varied."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -51,6 +51,11 @@ class Experiment:
     by_optuna: bool = False
     safety: str = "at_fault"  # metrics of the safety-performance points
     performance: str = "return"
+
+    @property
+    def is_sweep(self) -> bool:
+        """Does only `rss-shield sweep` run it, because something is varied or nothing is trained?"""
+        return bool(self.policies or self.points or self.grid or self.drawn)
 
 
 _FILE = ("name", "about", "environments", "arms", "policies", "seeds", "options", "tests", "sweep", "axes")
@@ -113,6 +118,21 @@ def experiment_of(given: Mapping[str, Any]) -> Experiment:
         by_optuna="optuna" in sweep,
         **{name: str(value) for name, value in axes.items()},
     )
+
+
+def training_words(
+    environment: str, arms: Iterable[str], seeds: Iterable[int], tests: Mapping[str, Any], options: Mapping[str, Any]
+) -> list[str]:
+    """The command line of `rss-shield train`.
+
+    Raises:
+      ValueError: test seeds that training has not.
+    """
+    expected = _TESTS["first_seed"]
+    if tests["first_seed"] != expected:
+        raise ValueError(f"tests.first_seed = {tests['first_seed']}: expected {expected} where arms train")
+    words = ["--env-id", environment, "--arms", *arms, "--seeds", *map(str, seeds)]
+    return [*words, "--eval-episodes", str(tests["episodes"]), *as_words(options)]
 
 
 def as_words(options: Mapping[str, Any]) -> list[str]:

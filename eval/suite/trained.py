@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rss_shield import train
-from rss_shield.eval.runs.experiment import as_words
+from rss_shield.eval.runs.experiment import training_words
 from rss_shield.eval.runs.store import Files
 
 _KEPT = ("learning_curve.csv", "removal_curve.csv", "model.zip", "card.json", "README.md")
@@ -39,13 +39,9 @@ def arguments_of(config: dict[str, Any]) -> list[str]:
     Raises:
       ValueError: test seeds that training has not.
     """
-    if config["first_seed"] != train.FIRST_TEST_SEED:
-        raise ValueError(
-            f"tests.first_seed = {config['first_seed']}: expected {train.FIRST_TEST_SEED} where arms train"
-        )
-    words = ["--env-id", config["environment"], "--arms", config["arm"], "--seeds", str(config["seed"])]
-    words += ["--eval-episodes", str(config["episodes"]), "--replay-episodes", "0"]
-    return words + as_words(config["options"])
+    tests, options = {name: config[name] for name in ("episodes", "first_seed")}, config["options"]
+    words = training_words(config["environment"], [config["arm"]], [config["seed"]], tests, options)
+    return [*words, "--replay-episodes", "0"]
 
 
 def _quietly(call: Any, arguments: list[str]) -> None:
