@@ -33,6 +33,10 @@ NEARLY = 0.02  # of the best return, lost at most
 HARMLESS = 0.01  # crashes without the shield, at most
 FLAT = 0.02  # change of the return over the last fifth of training, at most, in parts of its size
 CALLED = {arm.called: arm for arm in ARMS.values()}
+DRAWN = (  # what the frontier is drawn from
+    *("train", "test", "train_seed", "seed", "crashed", "blame"),
+    *("return", "override_share", "mean_acceleration_change"),
+)
 HEADER = """# Arms compared
 
 Written by `python bench/campaign.py --plan short --write` from runs of `train.py`.
@@ -156,9 +160,14 @@ def last_change(curve: pd.DataFrame) -> float:
     return (last - before) / max(abs(before), 1e-9)
 
 
+def mean_of(cell: pd.DataFrame, metric: str) -> float:
+    """What `estimate` is about, without its interval."""
+    return float(cell.groupby("train_seed")[metric].mean().mean())
+
+
 def best_behind_shield(cells: dict[tuple[str, str], pd.DataFrame]) -> float:
     """The highest return of an arm behind the shield."""
-    return max(estimate(cell, "return").value for (_, test), cell in cells.items() if test == ON)
+    return max(mean_of(cell, "return") for (_, test), cell in cells.items() if test == ON)
 
 
 # ---------------------------------------------------------------- texts
@@ -232,7 +241,7 @@ def first_sentences(road: Road, cells: dict[tuple[str, str], pd.DataFrame]) -> s
         }
         better = {arm: gain for arm, gain in differences.items() if gain.low > 0}
         worse = [arm for arm, loss in differences.items() if loss.high < 0]
-        name = f"`{baseline}` ({ARMS[baseline].label}, return {estimate(cells[baseline, ON], 'return').value:.1f})"
+        name = f"`{baseline}` ({ARMS[baseline].label}, return {mean_of(cells[baseline, ON], 'return'):.1f})"
         if better:
             listed = ", ".join(f"`{arm}` by {number(gain, 2, '+')}" for arm, gain in better.items())
             parts.append(f"Behind the shield these beat {name}: {listed}.")
@@ -255,10 +264,10 @@ def questions(road: Road, cells: dict[tuple[str, str], pd.DataFrame]) -> str:
         if not learns(arm):
             continue
         if test == ON:
-            share, earned = estimate(cell, "override_share").value, estimate(cell, "return").value
+            share, earned = mean_of(cell, "override_share"), mean_of(cell, "return")
             if share <= SELDOM and earned >= best - NEARLY * abs(best):
                 asleep.append(f"`{arm}` ({100 * share:.1f} %, {earned:.1f})")
-        if test == OFF and estimate(cell, "crash").value <= HARMLESS:
+        if test == OFF and mean_of(cell, "crash") <= HARMLESS:
             harmless.append(f"`{arm}` ({percent(estimate(cell, 'crash'))} %)")
     lines = [
         f"Overridden in at most {100 * SELDOM:.0f} % of the frames with at least {100 * (1 - NEARLY):.0f} % of the "
@@ -284,7 +293,7 @@ def figures_of(road: Road, folder: Path) -> Iterator[str]:
     drawn = folder / f".{road.env_id}"
     drawn.mkdir(parents=True, exist_ok=True)
     try:
-        summary = summarise(road.episodes[road.episodes["train"].isin(CALLED)])
+        summary = summarise(road.episodes.loc[road.episodes["train"].isin(CALLED), list(DRAWN)])
         plot_frontier(summary, drawn, road.env_id)
         found = [("frontier", "Who needs the shield, and what it earns with it and without.")]
         if len(road.removals):
