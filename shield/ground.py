@@ -17,6 +17,7 @@ from rss_shield.shield.sampling import frames_for
 
 CONDITIONS = tuple(ROADS)  # from the best grip to the worst
 STATES = len(CONDITIONS) ** 2  # rows of one vehicle class: index of the worst times 4, and that of the best
+MOST = len(CONDITIONS) * (len(CONDITIONS) - 1)  # among these the row of who needs most: worst relied on, best feared
 
 
 class VehicleClass(NamedTuple):

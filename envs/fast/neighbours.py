@@ -11,7 +11,7 @@ import numpy as np
 
 from rss_shield.envs.fast.state import OBSTACLE, UNSEEN
 from rss_shield.envs.options import Settings
-from rss_shield.envs.roads.lanes import reach_of, road_through, turned_round
+from rss_shield.envs.roads.lanes import reach_on, road_through, turned_round
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
 from rss_shield.envs.sensing import age_of
 from rss_shield.shield._numba.compiled import inner, rare
@@ -30,7 +30,6 @@ from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame
 from rss_shield.shield.lanes.inflation import inflate
 from rss_shield.shield.lanes.memory import MEMORY, forget_safe, start_over
 from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, least_cosine, slowed
-from rss_shield.shield.params import RSSParams
 
 _HALF_DIAGONAL = np.hypot(CAR_LENGTH, CAR_WIDTH) / 2  # no road user is longer, however it is turned [m]
 _ROUNDING = 1e-6  # more than world and lane coordinates differ by [m]
@@ -80,10 +79,7 @@ class Distances(NamedTuple):
 
 def compile_lane_frames(network, settings: Settings, ground: Ground | None = None) -> LaneFrames:
     """Lane frames of all lanes of a `highway_env.road.road.RoadNetwork`: one each, because its lanes do not fork."""
-    ego, other = settings.table.ego, settings.table.other
-    if ground is not None:  # nobody needs more anywhere
-        ego, other = (RSSParams(*map(float, rows[-1])) for rows in (ground.ego, ground.other))
-    reach = reach_of(ego, other, settings.table.dt)
+    reach = reach_on(settings.table, ground)
     lanes = [road_through(network, index, reach) for index in network.lanes_dict()]
     roads = lanes + [turned_round(road) for road in lanes]
     same = np.array([[same_frame(a, b) for b in roads] for a in roads])

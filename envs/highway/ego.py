@@ -8,7 +8,7 @@ from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
 
 from rss_shield.envs.highway.senses import Senses, others_on
 from rss_shield.envs.options import LANES, OPEN_SPACE, PLANS, Settings
-from rss_shield.envs.roads.lanes import Heading, heading_of, reach_of, roads_along, tightest
+from rss_shield.envs.roads.lanes import Heading, heading_of, reach_on, roads_along, tightest
 from rss_shield.envs.roads.slip import slip_of, steering_of
 from rss_shield.envs.roads.steering import MAX_SLIP
 from rss_shield.shield._numba.compiled import records
@@ -517,8 +517,7 @@ class ShieldedEgo:
 
     def _roads_along(self, heading: Heading):
         """The road that the ego is measured along, and the one with the branches that it may still take."""
-        table = self.settings.table
-        return roads_along(self.vehicle.road.network, heading, reach_of(table.ego, table.other, table.dt))
+        return roads_along(self.vehicle.road.network, heading, reach_on(self.settings.table, self.ground))
 
     def _in_own_lane(self, other) -> bool:
         """Is a car inside a lane that runs its way? Only asked of oncoming cars."""

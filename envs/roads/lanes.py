@@ -32,7 +32,8 @@ from rss_shield.shield.geometry import (
     make_road,
     wrap_angle,
 )
-from rss_shield.shield.params import RSSParams
+from rss_shield.shield.ground import MOST, STATES, Ground, params_at
+from rss_shield.shield.params import RSSParams, Table
 from rss_shield.shield.sampling import euler_margin
 
 LaneIndex = tuple[str, str, int]
@@ -297,6 +298,15 @@ def reach_of(ego: RSSParams, other: RSSParams, dt: float) -> float:
     margins = euler_margin(v, ego.a_min_brake, dt) + euler_margin(v, other.a_min_brake, dt) + _LONGEST
     head_on = d_min_longitudinal(v, -v, True, ego, other, ego.a_min_brake_correct, other.a_min_brake_correct)
     return float(head_on + margins)
+
+
+def reach_on(table: Table, ground: Ground | None) -> float:
+    """`reach_of` of the pair that needs most: on any piece of a ground, of any kind of vehicle [m]."""
+    if ground is None:
+        return reach_of(table.ego, table.other, table.dt)
+    ego = params_at(ground.ego, MOST)
+    classes = range(len(ground.shares))
+    return max(reach_of(ego, params_at(ground.other, STATES * k + MOST), table.dt) for k in classes)
 
 
 # ---------------------------------------------------------------- which road a car drives

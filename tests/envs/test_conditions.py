@@ -8,6 +8,8 @@ import pytest
 
 from rss_shield import make, make_vec
 from rss_shield.envs.conditions import ground_of, group_of, held, pieces_of, shares_of
+from rss_shield.envs.roads.lanes import reach_of, reach_on
+from rss_shield.shield.ground import params_at
 from rss_shield.shield.params import GRAVITY, PRESETS, ROADS, Rules
 from rss_shield.shield.table import table_for
 
@@ -117,3 +119,16 @@ def test_both_simulators_drive_on_the_same_ground(sensing):
         told.append(rows)
     for value, other in zip(*told, strict=True):
         assert np.array_equal(value, other)
+
+
+@pytest.mark.parametrize(
+    "classes", [{"truck": 0.3, "motorcycle": 0.1}, {"motorcycle": 0.1, "truck": 0.3}, {"bus": 1.0}]
+)
+def test_roads_are_known_as_far_as_anybody_anywhere_can_matter(classes):
+    ground = ground_of(TABLE, PATCHES, classes)
+    needs = [
+        reach_of(params_at(ground.ego, i), params_at(ground.other, k), TABLE.dt)
+        for i in range(len(ground.ego))
+        for k in range(len(ground.other))
+    ]
+    assert reach_on(TABLE, ground) == max(needs) > reach_on(TABLE, None)
