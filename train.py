@@ -44,7 +44,7 @@ from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import changes, open_run, recorded
 from rss_shield.eval.suite import showcase
-from rss_shield.shield.junctions.controller import ENTRIES
+from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.params import PRESETS, Preset, Rules, with_parameters
 

@@ -37,8 +37,9 @@ from rss_shield.eval.pages import markdown, write_page
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.stats import Interval, bootstrap_mean, paired_difference, wilson
-from rss_shield.shield.junctions.controller import ENTRIES, block
 from rss_shield.shield.junctions.examined import EXAMINED
+from rss_shield.shield.junctions.memory import ENTRIES
+from rss_shield.shield.junctions.obstacles import block
 from rss_shield.shield.junctions.plans import INTENTS, NEVER, Track
 from rss_shield.shield.junctions.reach import THREAT
 from rss_shield.shield.verdicts import AT_FAULT, BLAMES

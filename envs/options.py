@@ -27,8 +27,8 @@ from rss_shield.envs.worlds.signalised import SignalisedIntersectionEnv
 from rss_shield.envs.worlds.streets import StreetEnv
 from rss_shield.shield.filters.answer import FILTERS, RSS, THRESHOLDS, Filter
 from rss_shield.shield.ground import CONDITIONS, Ground
-from rss_shield.shield.junctions.controller import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED, TABLE
+from rss_shield.shield.junctions.memory import CAUTIOUS, ENTRIES
 from rss_shield.shield.junctions.plans import ANY, INTENTS
 from rss_shield.shield.lanes.correction import CORRECTIONS, NEAREST
 from rss_shield.shield.open_space.frames import WHEELS
@@ -68,7 +68,7 @@ class Settings(NamedTuple):
     table: Table
     overrides: bool  # False: watch only
     scheme: int = LANES  # what keeps the ego safe: LANES, PLANS or OPEN_SPACE
-    entry: int = CAUTIOUS  # whom the ego expects to give way: index into `shield.junctions.controller.ENTRIES`
+    entry: int = CAUTIOUS  # whom the ego expects to give way: index into `shield.junctions.memory.ENTRIES`
     intent: int = ANY  # which routes it expects of others: index into `shield.junctions.plans.INTENTS`
     waits_anywhere: bool = False  # it may also wait inside a junction, in the way of nobody who is there yet
     examine: int = TABLE  # against whom plans are checked: index into `shield.junctions.examined.EXAMINED`

@@ -9,9 +9,10 @@ import numpy as np
 
 from rss_shield.shield import PRESETS, Rules, table_for
 from rss_shield.shield.command import Command
-from rss_shield.shield.lanes.controller import Body, find_danger, respond
+from rss_shield.shield.lanes.controller import find_danger, respond
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.restriction import Body
 
 DT, SECONDS = 0.1, 12.0
 table = table_for(PRESETS["slides"], Rules(), DT)

@@ -35,7 +35,7 @@ from rss_shield.eval.progress import move_to, progress_bar
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import versions
 from rss_shield.eval.table import print_table, write_table
-from rss_shield.shield.junctions.controller import ENTRIES
+from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.params import PRESETS, Preset, RSSParams
 

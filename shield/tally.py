@@ -11,7 +11,7 @@ from rss_shield.shield._numba.compiled import compiled
 from rss_shield.shield.comfort import Comfort, comfort_of
 from rss_shield.shield.definitions.response import AXES
 from rss_shield.shield.junctions.plans import PLAN_NAMES
-from rss_shield.shield.lanes.controller import response_name
+from rss_shield.shield.lanes.responses import response_name
 from rss_shield.shield.open_space.pair import DANGER_NAMES
 from rss_shield.shield.verdicts import DUTIES, VERDICTS
 
@@ -48,7 +48,7 @@ DECISION_FIELDS = [
     ("margin_lon", "f8"),  # of the pair nearest to danger [m]
     ("margin_lat", "f8"),
     ("partner", "i8"),  # who that is, or who held the ego back; -1 = nobody
-    ("response", "i8"),  # sum of the bits of `shield.lanes.controller`
+    ("response", "i8"),  # sum of the bits of `shield.lanes.responses`
     ("cost", "f8"),
     ("override_share", "f8"),
     ("anticipation_share", "f8"),
@@ -137,7 +137,7 @@ def count_frame(step, episode, overridden, anticipated, limited, pairs, broken, 
       step, episode: records with the fields `DECISION_FIELDS` and `EPISODE_FIELDS`.
       overridden, anticipated, limited: what changed the command; a duty goes before a limit.
       pairs, broken: dangerous pairs, and those whose duty the ego broke.
-      response: bits of `shield.lanes.controller`.
+      response: bits of `shield.lanes.responses`.
       ttc: smallest time to collision [s].
     """
     limited = limited and not overridden

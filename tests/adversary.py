@@ -14,10 +14,12 @@ from rss_shield.shield._numba.compiled import compiled_for_arrays as compiled
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.response import LAT, LON
 from rss_shield.shield.geometry import half_extents, largest_half_extents
-from rss_shield.shield.lanes.controller import Body, always_on, find_danger, respond, restrict
+from rss_shield.shield.lanes.controller import find_danger, respond
 from rss_shield.shield.lanes.judge import judge_contact, judge_frame
+from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.memory import MEMORY, merge, remember
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
+from rss_shield.shield.lanes.restriction import Body, restrict
 from rss_shield.shield.params import PRESETS, RSSParams, Rules, Table
 from rss_shield.shield.sampling import frames_for
 

@@ -8,8 +8,10 @@ import numpy as np
 
 from rss_shield.envs.roads.ways import Junction, junction_of
 from rss_shield.shield.junctions.conflict_areas import cell_of, in_conflict
-from rss_shield.shield.junctions.controller import CAUTIOUS, CROSSING, PLAN, SAMPLE, judge_crossing, junction_frame
+from rss_shield.shield.junctions.controller import junction_frame
 from rss_shield.shield.junctions.examined import TABLE as TABLE_ONLY
+from rss_shield.shield.junctions.judge import judge_crossing
+from rss_shield.shield.junctions.memory import CAUTIOUS, CROSSING, PLAN, SAMPLE
 from rss_shield.shield.junctions.plans import Scene, Track
 from rss_shield.shield.junctions.reach import THREAT
 from rss_shield.shield.params import PRESETS, Rules, Table

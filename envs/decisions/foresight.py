@@ -16,11 +16,12 @@ from rss_shield.shield._numba.compiled import apart, compiled, inner
 from rss_shield.shield.chosen import how_many, which
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import reach
-from rss_shield.shield.lanes.controller import find_danger, restrict
+from rss_shield.shield.lanes.controller import find_danger
 from rss_shield.shield.lanes.frame import beyond
 from rss_shield.shield.lanes.lane_changes import is_blocked
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.restriction import restrict
 
 KP_ACCELERATION = ControlledVehicle.KP_A  # [1/s]
 _NOBODY = -np.inf  # the nearest and the soonest are of no interest

@@ -8,7 +8,8 @@ looked at: who has lost all plans hardly ever finds one within two frames.
 
 from rss_shield.envs.decisions.foresight import KP_ACCELERATION
 from rss_shield.shield._numba.compiled import apart, inner
-from rss_shield.shield.junctions.controller import junction_frame, leaves_plan, limit
+from rss_shield.shield.junctions.controller import junction_frame, leaves_plan
+from rss_shield.shield.junctions.limits import limit
 from rss_shield.shield.junctions.plans import Scene, Track
 
 _STRIDE = 3  # frames from one look to the next

@@ -56,7 +56,7 @@ from rss_shield.envs.sensing import Sensing
 from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, rare
 from rss_shield.shield.comfort import RIDE
 from rss_shield.shield.ground import Ground
-from rss_shield.shield.junctions.controller import CROSSING
+from rss_shield.shield.junctions.memory import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
 from rss_shield.shield.risk import RiskSettings
 from rss_shield.shield.table import table_for

@@ -21,8 +21,9 @@ from rss_shield.envs.fast.state import EPISODE
 from rss_shield.envs.roads.network import heading_at
 from rss_shield.envs.roads.steering import PURSUIT
 from rss_shield.shield._numba.compiled import inner, part
-from rss_shield.shield.junctions.controller import CROSSING, has_plan
-from rss_shield.shield.lanes.controller import Body
+from rss_shield.shield.junctions.controller import has_plan
+from rss_shield.shield.junctions.memory import CROSSING
+from rss_shield.shield.lanes.restriction import Body
 
 
 class Desk(NamedTuple):

@@ -40,15 +40,18 @@ from rss_shield.shield.comfort import ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import largest_half_extents
-from rss_shield.shield.junctions.controller import CROSSING, has_plan, judge_crossing, junction_frame
+from rss_shield.shield.junctions.controller import has_plan, junction_frame
 from rss_shield.shield.junctions.held_back import held_by
+from rss_shield.shield.junctions.judge import judge_crossing
+from rss_shield.shield.junctions.memory import CROSSING
 from rss_shield.shield.junctions.plans import Scene
-from rss_shield.shield.lanes.controller import Body, Response, find_danger, respond
+from rss_shield.shield.lanes.controller import Response, find_danger, respond
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up
+from rss_shield.shield.lanes.restriction import Body
 from rss_shield.shield.tally import (
     copy_judgement,
     count_change,

@@ -18,16 +18,11 @@ from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
 from rss_shield.shield.geometry import COS, SIN, is_straight
 from rss_shield.shield.ground import STATES, Ground, state_along, table_of_kind, table_on, worse_of
-from rss_shield.shield.lanes.controller import (
-    beyond_doubt,
-    look_ahead_at,
-    look_ahead_of,
-    may_be_next,
-    may_bind,
-)
+from rss_shield.shield.lanes.controller import beyond_doubt, may_be_next
 from rss_shield.shield.lanes.far_pairs import least_margin, own_share
 from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame
 from rss_shield.shield.lanes.inflation import inflate
+from rss_shield.shield.lanes.look_ahead import look_ahead_at, look_ahead_of, may_bind
 from rss_shield.shield.lanes.memory import MEMORY, forget_safe, start_over
 from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, least_cosine, slowed
 

@@ -28,7 +28,7 @@ from rss_shield.envs.roads.network import (
 from rss_shield.envs.roads.ways import CAR_ON_ROAD
 from rss_shield.shield._numba.compiled import inner
 from rss_shield.shield.geometry import PIECE_FIELDS
-from rss_shield.shield.junctions.controller import SAMPLE
+from rss_shield.shield.junctions.memory import SAMPLE
 from rss_shield.shield.junctions.reach import THREAT
 from rss_shield.shield.lanes.pair import ROAD_USER
 from rss_shield.shield.risk import MARKING, SOURCE

@@ -23,9 +23,11 @@ from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.options import Settings
 from rss_shield.shield.definitions.kinematics import stopping_distance
 from rss_shield.shield.junctions.conflict_areas import CELL, cell_of
-from rss_shield.shield.junctions.controller import CAUTIOUS, PRIORITY, JunctionReport, is_follower
+from rss_shield.shield.junctions.controller import JunctionReport
+from rss_shield.shield.junctions.followers import is_follower
+from rss_shield.shield.junctions.memory import CAUTIOUS, PRIORITY
 from rss_shield.shield.junctions.plans import Scene, Track
-from rss_shield.shield.lanes.controller import RESPONSE_BRAKE
+from rss_shield.shield.lanes.responses import RESPONSE_BRAKE
 
 GAP = 35.0  # whoever waits so far before the junction is in the way of no car that sets off at the junction [m]
 PATIENCE = 15.0  # an agent that has waited for that long in all is given no more gaps: it may not want any [s]

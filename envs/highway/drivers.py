@@ -15,7 +15,7 @@ from rss_shield.envs.highway.step import attach, shield_on
 from rss_shield.envs.options import LANES, Settings
 from rss_shield.envs.worlds.walkers import Watched
 from rss_shield.shield.ground import Ground
-from rss_shield.shield.junctions.controller import PRIORITY
+from rss_shield.shield.junctions.memory import PRIORITY
 from rss_shield.shield.junctions.plans import KNOWN
 
 RECKLESS = "rss_shield.envs.highway.drivers.RecklessVehicle"

@@ -17,12 +17,7 @@ from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
 from rss_shield.shield.ground import STATES, Ground, state_along, table_on, worse_of
-from rss_shield.shield.lanes.controller import (
-    Body,
-    Response,
-    find_danger,
-    respond,
-)
+from rss_shield.shield.lanes.controller import Response, find_danger, respond
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
@@ -31,6 +26,7 @@ from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, start_over
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
+from rss_shield.shield.lanes.restriction import Body
 from rss_shield.shield.tally import (
     CONTACT,
     COUNTED,

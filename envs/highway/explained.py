@@ -12,7 +12,7 @@ from rss_shield.envs.highway.around import around
 from rss_shield.envs.highway.ego import Look, ShieldedEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.highway.step import shield_on
-from rss_shield.shield.lanes.controller import response_name
+from rss_shield.shield.lanes.responses import response_name
 from rss_shield.shield.trace import SIDES
 
 FONT = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"

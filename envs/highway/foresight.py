@@ -17,7 +17,7 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.roads.steering import PURSUIT
 from rss_shield.shield.junctions.controller import has_plan
-from rss_shield.shield.lanes.controller import Body
+from rss_shield.shield.lanes.restriction import Body
 
 
 def action_mask(ego: ShieldedEgo, env: Any) -> np.ndarray:

@@ -14,17 +14,10 @@ from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import stopping_distance
 from rss_shield.shield.definitions.signals import keep_right, may_pass
 from rss_shield.shield.junctions.conflict_areas import CELL
-from rss_shield.shield.junctions.controller import (
-    CAUTIOUS,
-    CROSSING,
-    PLAN,
-    SAMPLE,
-    JunctionReport,
-    has_plan,
-    judge_crossing,
-    junction_frame,
-)
+from rss_shield.shield.junctions.controller import JunctionReport, has_plan, junction_frame
 from rss_shield.shield.junctions.held_back import held_by
+from rss_shield.shield.junctions.judge import judge_crossing
+from rss_shield.shield.junctions.memory import CAUTIOUS, CROSSING, PLAN, SAMPLE
 from rss_shield.shield.junctions.plans import NEVER, Scene, Track
 from rss_shield.shield.junctions.reach import THREAT
 from rss_shield.shield.tally import count_change, note_executed

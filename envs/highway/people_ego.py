@@ -12,7 +12,8 @@ from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.ways import CAR_ON_ROAD
 from rss_shield.envs.worlds.walkers import RADIUS, ParkedCar, Walker, along_way
 from rss_shield.shield.definitions.occlusion import REASONABLE
-from rss_shield.shield.junctions.controller import CROSSING, JunctionReport
+from rss_shield.shield.junctions.controller import JunctionReport
+from rss_shield.shield.junctions.memory import CROSSING
 from rss_shield.shield.junctions.plans import Scene
 from rss_shield.shield.junctions.reach import THREAT
 from rss_shield.shield.people.judge import WATCHED, Seen, judge_exposure, watch_person

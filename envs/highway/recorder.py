@@ -24,7 +24,7 @@ from rss_shield.shield.definitions.signals import GREEN, RED, YELLOW
 from rss_shield.shield.junctions.conflict_areas import CELL, X, Y, cell_of
 from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.plans import throttle
-from rss_shield.shield.lanes.controller import response_name
+from rss_shield.shield.lanes.responses import response_name
 from rss_shield.shield.trace import (
     CHANGED_BY,
     PLANS,

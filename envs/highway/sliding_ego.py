@@ -15,9 +15,10 @@ from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.bicycle import across, frame_across, steer_along
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import FILTERS
-from rss_shield.shield.lanes.controller import Response, restrict
+from rss_shield.shield.lanes.controller import Response
 from rss_shield.shield.lanes.correction import CORRECTIONS
 from rss_shield.shield.lanes.memory import Bounds
+from rss_shield.shield.lanes.restriction import restrict
 
 FLUCTUATION = 0.02  # speeds across the lane below this are none (Def. 5): tyres come to rest gradually [m/s]
 SLIDES_OUT = 0.15  # likewise where steering has no effect: it is over within centimetres, for which mu is there [m/s]

@@ -49,7 +49,7 @@ from rss_shield.shield.junctions.conflict_areas import (
     reach_beyond,
     reaches_into,
 )
-from rss_shield.shield.junctions.controller import block
+from rss_shield.shield.junctions.obstacles import block
 from rss_shield.shield.junctions.plans import ANY, KNOWN, STRAIGHT, Track
 
 _OFF = 2.0  # lateral offset up to which a car may be on a lane [m]

@@ -9,8 +9,8 @@ from rss_shield.envs.fast.recording import Log
 from rss_shield.envs.fast.state import DIRECT, META, OBSTACLE
 from rss_shield.envs.options import LANES, Settings
 from rss_shield.envs.roads.traced import configuration, lane_id, lanes_of
-from rss_shield.shield.junctions.controller import ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED
+from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.trace import Event, Trace, ego_of, users_of
 

@@ -9,8 +9,9 @@ from rss_shield.shield.command import Command
 from rss_shield.shield.filters import control_barrier, fixed_distance, time_to_collision
 from rss_shield.shield.filters.leader import leader_of
 from rss_shield.shield.filters.once_per_decision import PRINTED, is_dangerous, printed_duties
-from rss_shield.shield.lanes.controller import Response, restrict
+from rss_shield.shield.lanes.controller import Response
 from rss_shield.shield.lanes.memory import Bounds
+from rss_shield.shield.lanes.restriction import restrict
 
 RSS, TTC, DISTANCE, CBF, LIMITS, PRINTED_DEF_10 = range(6)
 FILTERS = ("rss", "ttc", "distance-45m", "cbf", "limits", "literal-def10")

@@ -1,7 +1,7 @@
 """Who is in the way of what the ego wants at a junction: for reports, no duty depends on it."""
 
 from rss_shield.shield._numba.compiled import apart, inner
-from rss_shield.shield.junctions.controller import limit
+from rss_shield.shield.junctions.limits import limit
 from rss_shield.shield.junctions.plans import ANYWHERE, NEVER, SLACK, go_plan, plan_conflict, stop_conflict
 
 _FORESIGHT = 20.0  # [s]

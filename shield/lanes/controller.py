@@ -8,32 +8,17 @@ from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.chosen import how_many, which
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.kinematics import time_to_collision
-from rss_shield.shield.definitions.lateral import d_min_no_credit
 from rss_shield.shield.geometry import signed_gap
-from rss_shield.shield.ground import table_of, table_of_kind
-from rss_shield.shield.lanes.anticipation import acceleration_cap, farthest_bound, lateral_cap
+from rss_shield.shield.ground import table_of
 from rss_shield.shield.lanes.far_pairs import least_margin, own_share
-from rss_shield.shield.lanes.frame import beyond
-from rss_shield.shield.lanes.lane_changes import room_beside
-from rss_shield.shield.lanes.memory import (
-    Bounds,
-    catch_up,
-    may_back_up,
-    merge,
-    owes_braking,
-    owes_lateral_stop,
-    owes_no_approach,
-    remember,
-)
-from rss_shield.shield.lanes.pair import (
-    STANDSTILL,
-    assess,
-    is_following,
-    leading_speed,
-    least_cosine,
-    toward,
-)
-from rss_shield.shield.sampling import lateral_euler_margin, reach_from_rest, sampling_margin, slowest_in_danger
+from rss_shield.shield.lanes.lane_changes import Rooms, beside
+from rss_shield.shield.lanes.limits import always_on
+from rss_shield.shield.lanes.look_ahead import Caps, LookAhead, anticipate, look_ahead_at, look_ahead_of, may_bind_for
+from rss_shield.shield.lanes.memory import Bounds, catch_up, hold, may_back_up, merge, remember, response_to
+from rss_shield.shield.lanes.pair import STANDSTILL, assess, leading_speed, least_cosine
+from rss_shield.shield.lanes.responses import RESPONSE_STEER
+from rss_shield.shield.lanes.restriction import restrict
+from rss_shield.shield.sampling import reach_from_rest, slowest_in_danger
 
 
 class Danger(NamedTuple):
@@ -61,23 +46,8 @@ class Response(NamedTuple):
     limited: bool  # only the always-on limits did
 
 
-# PRESENT: brake for who is ahead by now; GO: on through a junction
-RESPONSE_BRAKE, RESPONSE_STEER, RESPONSE_PRESENT, RESPONSE_GO = 1, 2, 4, 8
-
 _SAFE_BEYOND_DOUBT = 1e-6  # margin of a pair that is far apart: more than rounding can change [m]
-_STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
-_CROOKED = 1.2  # times the heading bound: a car turned farther than this does not back up
-_STRAIGHT = 1.0 / 1.2  # times the heading bound: likewise one that must not move toward somebody beside it
-
-
-class Body(NamedTuple):
-    """What the ego's kinematics add to its `ROAD_USER` record."""
-
-    half_wheelbase: float  # distance from the centre to the rear axle [m]
-    max_slip: float  # largest slip angle the steering reaches [rad]
-    curvature: float  # of the lane under the ego, see `shield.lanes.frame.Bend` [1/m]
-    slack: float = 0.0  # likewise [rad]
-    backs_up: bool = False  # its driver asks for reverse by braking at standstill; others only hold then
+_STRAIGHT = 1.0 / 1.2  # times the heading bound: turned farther, who owes a lateral stop does not back up
 
 
 @compiled
@@ -113,81 +83,97 @@ def find_danger(
     """
     rules, dt = table.rules, table.dt
     free = always_on(ego, table.ego, rules, dt)
-    bounds, cap, left, right = free, np.inf, np.inf, np.inf
-    room_left = room_right = np.inf
-    look = look_ahead_of(ego, table)
+    bounds, caps, rooms = free, Caps(np.inf, np.inf, np.inf), Rooms(np.inf, np.inf)
     worst, partner, margin_lon, margin_lat, ttc = nearest, -1, np.inf, np.inf, soonest
     dangerous, response = False, 0
-    share_ego = own_share(ego.speed, ego.cos, table.ego, dt)
-    lead_ego, least_cos = leading_speed(ego, rules), least_cosine(rules)
-    far, held = beyond_doubt(ego.speed, table.ego, dt), slowest_in_danger(ego.speed, table.ego, dt)
+    own = _own_parts(ego, table)
+    held = slowest_in_danger(ego.speed, table.ego, dt)
     for a in range(how_many(who, users)):
         i = which(who, a)
-        user = users[i]
-        margin = least_margin(
-            user.s - ego.s,
-            ego.half_length + user.half_length,
-            user.speed,
-            user.cos,
-            user.wreck,
-            share_ego,
-            lead_ego,
-            least_cos,
-            table_of(table, user),
-        )
-        if (
-            memory[i].since == 0
-            and margin > max(worst, far)
-            and not _may_be_next(ego, user, ttc, rules)
-            and not _may_bind(ego, user, margin, look_ahead_at(look, ego, table, table.others, user.kind))
-        ):
-            memory[i].skipped = True
+        user, known = users[i], memory[i]
+        if known.since == 0 and _is_far_apart(ego, user, own, worst, ttc, table):
+            known.skipped = True
             continue
-        catch_up(memory[i], ego_before, users_before[i], table)
+        catch_up(known, ego_before, users_before[i], table)
         pair = assess(ego, user, table)
-        remember(memory[i], pair, ego, user, dt)
-        bounds = merge(bounds, memory[i], table.ego, rules, dt)
-        if rules.limits and (not may_back_up(memory[i], pair) or (user.vague and memory[i].since > 0)):
-            bounds = _hold(bounds, held)
-        if memory[i].since == 0 and rules.anticipation > 0.0:
-            if pair.safe_lon and not pair.safe_lat:
-                cap = min(cap, _cap_behind(pair, memory[i], table_of(table, user)))
-            elif pair.safe_lat and not pair.safe_lon:
-                limit = lateral_cap(pair.margin_lat, pair.w_ego, pair.w_other, table.ego, rules.anticipation, dt)
-                if pair.side > 0.0:
-                    right = min(right, limit)
-                else:
-                    left = min(left, limit)
-        if rules.take_back and not pair.safe_lon and pair.gap_lat > -min(ego.half_width, user.half_width):
-            room = room_beside(pair.margin_lat, pair.w_ego, table.ego, dt)
-            if pair.side > 0.0:
-                room_right = min(room_right, room)
-            else:
-                room_left = min(room_left, room)
-        if memory[i].since > 0:
+        remember(known, pair, ego, user, dt)
+        bounds = merge(bounds, known, table.ego, rules, dt)
+        caps = anticipate(caps, pair, known, table_of(table, user))
+        if rules.take_back:
+            rooms = beside(rooms, pair, ego, user, table.ego, dt)
+        if known.since > 0:
             dangerous = True
-            braking = owes_braking(memory[i], rules)
-            response |= RESPONSE_BRAKE if braking == 1 else (RESPONSE_PRESENT if braking == 2 else 0)
-            if owes_lateral_stop(memory[i], rules) or owes_no_approach(memory[i], rules):
-                response |= RESPONSE_STEER
-                if abs(ego.sin) > _STRAIGHT * rules.heading_bound:
-                    bounds = _hold(bounds, held)
+            owed = response_to(known, rules)
+            response |= owed
+            if owed & RESPONSE_STEER and abs(ego.sin) > _STRAIGHT * rules.heading_bound:
+                bounds = hold(bounds, held)
+        if rules.limits and (not may_back_up(known, pair) or (user.vague and known.since > 0)):
+            bounds = hold(bounds, held)
         margin = max(pair.margin_lon, pair.margin_lat)
         if margin < worst:
             worst, partner, margin_lon, margin_lat = margin, i, pair.margin_lon, pair.margin_lat
         if pair.gap_lat < 0.0 and pair.ego_is_rear and pair.v_ego > pair.v_other:
             ttc = min(ttc, time_to_collision(pair.gap_lon, pair.v_ego - pair.v_other))
-    eased = Bounds(
+    eased = _eased(bounds, caps)
+    return Danger(
+        free, bounds, eased, rooms.left, rooms.right, dangerous, partner, margin_lon, margin_lat, response, ttc
+    )
+
+
+class _OwnParts(NamedTuple):
+    """What the ego alone contributes to bounds of pairs."""
+
+    share: tuple[float, float]  # `own_share`
+    lead: float  # `leading_speed` [m/s]
+    least_cos: float  # `least_cosine`
+    far: float  # `beyond_doubt` [m]
+    look: LookAhead
+
+
+@inner
+def _own_parts(ego, table):
+    return _OwnParts(
+        own_share(ego.speed, ego.cos, table.ego, table.dt),
+        leading_speed(ego, table.rules),
+        least_cosine(table.rules),
+        beyond_doubt(ego.speed, table.ego, table.dt),
+        look_ahead_of(ego, table),
+    )
+
+
+@inner
+def _is_far_apart(ego, user, own, worst, ttc, table):
+    """Does nothing depend on a pair that is safe? `worst`, `ttc`: what is nearest to danger, and in time, so far."""
+    margin = least_margin(
+        user.s - ego.s,
+        ego.half_length + user.half_length,
+        user.speed,
+        user.cos,
+        user.wreck,
+        own.share,
+        own.lead,
+        own.least_cos,
+        table_of(table, user),
+    )
+    return (
+        margin > max(worst, own.far)
+        and not _may_be_next(ego, user, ttc, table.rules)
+        and not may_bind_for(ego, user, margin, look_ahead_at(own.look, ego, table, table.others, user.kind))
+    )
+
+
+@inner
+def _eased(bounds, caps):
+    """Bounds after `Caps`."""
+    return Bounds(
         bounds.a_lower,
-        min(bounds.a_upper, cap),
-        min(bounds.left, left),
-        min(bounds.right, right),
-        min(bounds.left_next, left),
-        min(bounds.right_next, right),
+        min(bounds.a_upper, caps.acceleration),
+        min(bounds.left, caps.left),
+        min(bounds.right, caps.right),
+        min(bounds.left_next, caps.left),
+        min(bounds.right_next, caps.right),
         bounds.v_lower,
     )
-    rooms = room_left, room_right
-    return Danger(free, bounds, eased, *rooms, dangerous, partner, margin_lon, margin_lat, response, ttc)
 
 
 @compiled
@@ -217,84 +203,6 @@ def respond(nominal, danger, ego, body, rules, dt):
     return Response(command, overridden, anticipated, limited != nominal and not overridden and not anticipated)
 
 
-@inner
-def _cap_behind(pair, memory, table):
-    """Cap of the acceleration behind a pair's other, inf where it is not ahead the same way [m/s^2]."""
-    if not pair.ego_is_rear or not is_following(pair.v_ego, pair.v_other, pair.opposite):
-        return np.inf
-    return acceleration_cap(
-        pair.gap_lon,
-        pair.margin_lon,
-        pair.v_ego,
-        pair.v_other,
-        memory.acceleration_other,
-        table.ego,
-        table.other,
-        table.rules.anticipation,
-        table.dt,
-    )
-
-
-class LookAhead(NamedTuple):
-    """Whom anticipation may be about."""
-
-    within: float  # margin below which it may bind behind a leader that stands, -inf = never [m]
-    horizon: float  # how much farther per speed of the leader [s]
-    lateral: float  # distance across the lane that keeps a car safe which does not move sideways [m]
-
-
-@compiled
-def look_ahead_of(ego, table):
-    """`LookAhead` of the ego on one frame."""
-    rules, dt = table.rules, table.dt
-    if rules.anticipation == 0.0:
-        return LookAhead(-np.inf, 0.0, 0.0)
-    w = max(toward(1.0, ego), toward(-1.0, ego), 0.0)
-    lateral = d_min_no_credit(w, 0.0, table.ego, table.other) + rules.overlap_margin
-    lateral += lateral_euler_margin(w, table.ego, dt) + sampling_margin(0.0, table.other, dt)
-    within, horizon = farthest_bound(max(ego.speed, 0.0), table.ego, table.other, rules.anticipation, dt)
-    return LookAhead(within, horizon, lateral)
-
-
-@inner
-def look_ahead_at(look, ego, table, others, kind):
-    """`LookAhead` at one road user; `look`: at those who are like `Table.other`, `others`: `Table.others`."""
-    if others is None:
-        return look
-    return look_ahead_of(ego, table_of_kind(table, others, kind))
-
-
-@compiled
-def may_bind(ahead, margin, gap_lat, drifts, speed, look):
-    """May anticipation cap the ego's acceleration for somebody? If not, nothing depends on measuring the pair.
-
-    Args:
-      ahead: of the ego.
-      margin: a lower bound of the margin of Def. 1 [m].
-      gap_lat: across the lane, or less [m].
-      drifts: does the user move sideways?
-      speed: of the user [m/s].
-      look: `LookAhead`.
-    """
-    if not ahead or (gap_lat >= look.lateral and not drifts):
-        return False
-    return margin < look.within + look.horizon * max(speed, 0.0)
-
-
-@inner
-def _may_bind(ego, user, margin, look):
-    """`may_bind` of a measured pair."""
-    gap_lat = signed_gap(user.y - ego.y, ego.half_width, user.half_width)
-    return may_bind(user.s >= ego.s, margin, gap_lat, user.u != 0.0 or user.sin != 0.0, user.speed, look)
-
-
-@inner
-def _hold(bounds, v_lower):
-    return Bounds(
-        bounds.a_lower, bounds.a_upper, bounds.left, bounds.right, bounds.left_next, bounds.right_next, v_lower
-    )
-
-
 @compiled
 def beyond_doubt(v, params, dt):
     """Margin of a pair that is far apart [m]: a standing ego may even begin to back up."""
@@ -315,176 +223,3 @@ def _may_be_next(ego, user, ttc, rules):
 def may_be_next(ahead, gap_lon, gap_lat, closing, ttc):
     """May a user be ahead in the way of the ego, and nearer in time than `ttc` [s]? Gaps [m], closing speed [m/s]."""
     return ahead and gap_lat < 0.0 and closing > 0.0 and gap_lon < ttc * closing
-
-
-@compiled
-def always_on(ego, params, rules, dt):
-    """Limits that hold even where nobody is in danger (conditions C1, C1y of the sampled proof)."""
-    if not rules.limits:
-        return Bounds(-np.inf, np.inf, np.inf, np.inf, np.inf, np.inf, min(ego.speed, 0.0))
-    cap = max((params.v_cap - ego.speed) / dt, 0.0)
-    growth = params.a_lat_max_accel * dt
-    left, right = max(toward(-1.0, ego), 0.0) + growth, max(toward(1.0, ego), 0.0) + growth
-    slowest = _slowest(ego, params, rules, dt)
-    return Bounds(-params.a_max_brake, min(params.a_max_accel, cap), left, right, left, right, slowest)
-
-
-@inner
-def _slowest(ego, params, rules, dt):
-    """Least speed after this frame where nobody is behind [m/s]: one that stands may back up slowly, if it is straight.
-
-    Backwards its wheels cannot both keep it from moving sideways and turn it straight.
-    """
-    held = slowest_in_danger(ego.speed, params, dt)
-    if ego.speed > STANDSTILL or ego.cos <= 0.0 or abs(ego.sin) > _CROOKED * rules.heading_bound:
-        return held
-    return min(max(ego.speed - params.a_max_accel * dt, -rules.reverse_speed), held)
-
-
-@compiled
-def restrict(nominal, bounds, ego, body, rules, dt):
-    """The command nearest to the nominal one inside the bounds."""
-    a = min(max(nominal.acceleration, bounds.a_lower), bounds.a_upper)
-    if bounds.a_lower > -np.inf or bounds.a_upper < 0.0:
-        a = max(a, _least_acceleration(nominal.acceleration, bounds, ego.speed, body, dt))
-    return Command(a, _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt))
-
-
-@inner
-def _least_acceleration(nominal, bounds, v, body, dt):
-    """No braking goes on behind standstill, unless the driver asks for reverse then: its last step is partial."""
-    v_next = v + min(nominal, abs(bounds.a_upper)) * dt
-    if v > STANDSTILL or not body.backs_up or (v > -STANDSTILL and v_next > -STANDSTILL):
-        return -max(v, 0.0) / dt
-    return (max(bounds.v_lower, min(v_next, 0.0)) - v) / dt
-
-
-@inner
-def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
-    """Slip angle nearest to the nominal one inside the lateral bounds [rad].
-
-    With psi the heading relative to the lane, slip beta moves the car sideways at v sin(psi + beta)
-    at once and turns it by G sin(beta), G = v dt / half_wheelbase. For G > 1 the heading overshoots,
-    for G > 2 holding the lateral speed alone makes it diverge: so the lateral speed of this frame, the
-    one that the next heading commits to, the course and the heading are bounded together. Their
-    intervals always share the slip that straightens the car (see `_straightening_slip`): it moves
-    the car no faster than its heading already does, so no bound that was kept so far is lost.
-    """
-    v = ego.speed
-    if abs(v) < STANDSTILL or (bounds.left == np.inf and bounds.right == np.inf):
-        return slip
-    if v < 0.0:
-        return _restrict_slip_backwards(slip, bounds, ego, body, rules, dt)
-    v_next = max(v + a * dt, STANDSTILL)
-    psi, gain = ego.heading, v * dt / body.half_wheelbase
-    turned = body.curvature * v * dt  # the lane turns under the car during the frame ...
-    drift = 0.5 * turned * v  # ... and curves away from its tangent [m/s]
-    psi_next = psi + gain * np.sin(slip) - turned
-    permitted = _is_permitted(psi + slip, psi_next, body.slack, v, v_next, drift, bounds, rules)
-    if permitted and abs(slip) <= body.max_slip:
-        return slip
-    neutral = _straightening_slip(psi, turned, drift, gain, v, v_next, bounds)
-
-    # lateral speed of this frame: -left <= v sin(psi + slip) - drift <= right
-    low = min(_arcsin((-bounds.left + drift) / v) - psi, neutral)
-    high = max(_arcsin((bounds.right + drift) / v) - psi, neutral)
-    # heading after this frame, by the speed it commits to and by the heading bound
-    psi_low = _arcsin(-bounds.left_next / v_next) + min(body.slack, 0.0)
-    psi_high = _arcsin(bounds.right_next / v_next) + max(body.slack, 0.0)
-    if rules.heading_bound < 1.0:
-        # the course, slip included, keeps the bound too: a leader's way along the lane relies on it
-        largest = np.arcsin(rules.heading_bound)
-        low, high = max(low, min(-largest - psi, neutral)), min(high, max(largest - psi, neutral))
-        psi_low, psi_high = max(psi_low, -largest), min(psi_high, largest)
-    low = max(low, min(_arcsin((psi_low - psi + turned) / gain), neutral))
-    high = min(high, max(_arcsin((psi_high - psi + turned) / gain), neutral))
-    low, high = max(low, -body.max_slip), min(high, body.max_slip)
-    return min(max(slip, low), high)
-
-
-@inner
-def _restrict_slip_backwards(slip, bounds, ego, body, rules, dt):
-    """The same in reverse: first the lateral speed of this frame, then the heading.
-
-    The slip that ends the sideways motion turns the car farther from the lane there, by v dt / half_wheelbase of its
-    angle. So a car that has to stop moving sideways also stops backing up, and comes to rest before that matters: until
-    then its side sweeps no more than the speed at its angle to the lane does, which is less than its share (Def. 6).
-    """
-    v, psi, gain = ego.speed, ego.heading, ego.speed * dt / body.half_wheelbase
-    turned = body.curvature * v * dt
-    drift = 0.5 * turned * v
-    low, high = _arcsin((bounds.right + drift) / v) - psi, _arcsin((-bounds.left + drift) / v) - psi
-    if rules.heading_bound < 1.0:
-        largest = np.arcsin(rules.heading_bound)
-        straight_low = _arcsin((largest - psi + turned) / gain)
-        straight_high = _arcsin((-largest - psi + turned) / gain)
-        low, high = min(max(low, straight_low), high), max(min(high, straight_high), low)
-    low, high = max(low, -body.max_slip), min(high, body.max_slip)
-    return min(max(slip, low), high)
-
-
-@inner
-def _is_permitted(course, psi_next, slack, v, v_next, drift, bounds, rules):
-    """Do course and next heading [rad] keep all bounds? The bounds in closed form, without solving for the slip."""
-    if abs(course) >= _STEEP or abs(psi_next) >= _STEEP:
-        return False
-    sin, sin_next, sin_committed = np.sin(course), np.sin(psi_next), np.sin(beyond(psi_next, slack))
-    steepest = rules.heading_bound
-    return (
-        -bounds.left <= v * sin - drift <= bounds.right
-        and -bounds.left_next <= v_next * sin_committed <= bounds.right_next
-        and abs(sin) <= steepest
-        and abs(sin_next) <= steepest
-    )
-
-
-@compiled
-def straighten(ego, a, bounds, body, dt):
-    """Slip angle that ends the sideways motion of a car that drives forward [rad]; 0 for one that does not.
-
-    Args:
-      ego: `ROAD_USER` record.
-      a: its acceleration on this frame [m/s^2].
-      bounds: `Bounds`.
-      body: `Body`.
-      dt: length of a frame [s].
-    """
-    v = ego.speed
-    if v < STANDSTILL:
-        return 0.0
-    turned = body.curvature * v * dt
-    v_next = max(v + a * dt, STANDSTILL)
-    return _straightening_slip(ego.heading, turned, 0.5 * turned * v, v * dt / body.half_wheelbase, v, v_next, bounds)
-
-
-@inner
-def _straightening_slip(psi, turned, drift, gain, v, v_next, bounds):
-    """Slip that ends the sideways motion [rad].
-
-    For G <= 1 the lateral speed itself is set to 0 and the heading follows by the factor 1 - G.
-    Beyond, the heading is set as the lane asks, and the lateral speed shrinks by 1 - 1/G on the way. While
-    G < 2 the heading still calms down by itself, and the lateral speed keeps its bound first.
-    """
-    if gain <= 1.0:
-        return _arcsin(drift / v) - psi
-    along = _arcsin(drift * v_next / v**2) - _arcsin(turned / gain)  # heading of a car that keeps to the bend
-    slip = _arcsin((turned - psi + along) / gain)
-    if gain < 2.0:
-        u = v * np.sin(psi + slip) - drift
-        slip = _arcsin((min(max(u, -bounds.left), bounds.right) + drift) / v) - psi
-    return slip
-
-
-@inner
-def _arcsin(x):
-    return np.arcsin(min(max(x, -1.0), 1.0))
-
-
-def response_name(response: int) -> str:
-    """Name of a sum of RESPONSE_* bits."""
-    if response & RESPONSE_GO:
-        return "go"
-    brakes = response & (RESPONSE_BRAKE | RESPONSE_PRESENT)
-    if response & RESPONSE_STEER:
-        return "both" if brakes else "lateral"
-    return "longitudinal" if brakes else "none"

@@ -1,6 +1,6 @@
 """What a duty makes of a command that it does not permit: the nearest permitted one, or the proper response in full.
 
-The nearest is the default (`shield.lanes.controller.restrict`): the least change of the acceleration, and of the slip
+The nearest is the default (`shield.lanes.restriction.restrict`): the least change of the acceleration, and of the slip
 angles that are permitted with that, the least change of the slip angle. It is the projection of the command onto what
 is permitted, axis by axis; what is permitted of the slip angle depends on the acceleration by way of the speed after
 the frame.
@@ -8,7 +8,8 @@ the frame.
 
 from rss_shield.shield._numba.compiled import apart
 from rss_shield.shield.command import Command
-from rss_shield.shield.lanes.controller import Response, restrict, straighten
+from rss_shield.shield.lanes.controller import Response
+from rss_shield.shield.lanes.restriction import restrict, straighten
 
 NEAREST, RESPONSE = range(2)
 CORRECTIONS = ("nearest", "response")

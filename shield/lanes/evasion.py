@@ -26,9 +26,9 @@ from rss_shield.shield.definitions.evasion import (
     smallest_separation,
 )
 from rss_shield.shield.definitions.lateral import d_min_no_credit
-from rss_shield.shield.lanes.controller import straighten
 from rss_shield.shield.lanes.memory import owes_braking
 from rss_shield.shield.lanes.pair import STANDSTILL
+from rss_shield.shield.lanes.restriction import straighten
 from rss_shield.shield.verdicts import KEPT
 
 HORIZON = 4.0  # that manoeuvres are followed for [s]

@@ -3,9 +3,11 @@
 Lateral speeds grow slowly (C1y), so an agent that changes its mind on every decision would never get off the line.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled
+from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.definitions.kinematics import stopping_distance
 
 OFF_CENTRE = 1.0  # farther than this from the centre of every lane, a car is between two lanes [m]
@@ -26,6 +28,24 @@ def room_beside(margin, w, car, dt):
     """
     rho, a, b = car.response_time, car.a_lat_max_accel, car.a_lat_min_brake
     return margin + w * (rho + dt / 2) + stopping_distance(w + a * rho, b) - stopping_distance(a * rho, b)
+
+
+class Rooms(NamedTuple):
+    """How far the ego may go to either side beside who is alongside [m]; inf where nobody is."""
+
+    left: float
+    right: float
+
+
+@inner
+def beside(rooms, pair, ego, user, car, dt):
+    """`Rooms` after one more pair; `car`: `RSSParams` of the ego."""
+    if pair.safe_lon or pair.gap_lat <= -min(ego.half_width, user.half_width):
+        return rooms
+    room = room_beside(pair.margin_lat, pair.w_ego, car, dt)
+    if pair.side > 0.0:
+        return Rooms(rooms.left, min(rooms.right, room))
+    return Rooms(min(rooms.left, room), rooms.right)
 
 
 @compiled

@@ -19,6 +19,7 @@ from rss_shield.shield.definitions.response import (
     step_threshold,
 )
 from rss_shield.shield.lanes.pair import assess
+from rss_shield.shield.lanes.responses import RESPONSE_BRAKE, RESPONSE_PRESENT, RESPONSE_STEER
 
 MEMORY = records(
     [
@@ -251,6 +252,14 @@ class Bounds(NamedTuple):
     v_lower: float  # speed after this frame, negative in reverse [m/s]
 
 
+@inner
+def hold(bounds, v_lower):
+    """Bounds with another lowest speed [m/s]."""
+    return Bounds(
+        bounds.a_lower, bounds.a_upper, bounds.left, bounds.right, bounds.left_next, bounds.right_next, v_lower
+    )
+
+
 @compiled
 def owes_braking(memory, rules):
     """Must the ego brake for this pair? Returns why: 0 no, 1 by Def. 4, 2 by the situation as it is now (hole H23)."""
@@ -271,6 +280,18 @@ def owes_lateral_stop(memory, rules):
 def owes_no_approach(memory, rules):
     """Must the ego stop moving toward whoever is beside it now (hole H23)?"""
     return rules.present_duties and memory.since > 0 and memory.side_now != 0.0
+
+
+@inner
+def response_to(memory, rules):
+    """What the ego owes to one pair: a sum of RESPONSE_* bits, 0 outside danger."""
+    if memory.since == 0:
+        return 0
+    braking = owes_braking(memory, rules)
+    response = RESPONSE_BRAKE if braking == 1 else (RESPONSE_PRESENT if braking == 2 else 0)
+    if owes_lateral_stop(memory, rules) or owes_no_approach(memory, rules):
+        response |= RESPONSE_STEER
+    return response
 
 
 @compiled

@@ -9,7 +9,7 @@ from rss_shield.shield.comfort import gap_in_way
 from rss_shield.shield.definitions.kinematics import time_to_collision
 from rss_shield.shield.definitions.unstructured import MAX_STEPS, ROW_FIELDS
 from rss_shield.shield.geometry import turned_half_extents
-from rss_shield.shield.lanes.controller import RESPONSE_BRAKE, RESPONSE_STEER
+from rss_shield.shield.lanes.responses import RESPONSE_BRAKE, RESPONSE_STEER
 from rss_shield.shield.open_space.frames import (
     MAX_SLIP,
     PEDESTRIAN,

@@ -1,6 +1,6 @@
 """Who is to blame for a contact with a pedestrian, or with somebody who was hidden: Def. 27 with Section 14, Def. 25.
 
-The ego owes a plan that stays clear of where pedestrians may be (`shield.junctions.controller.judge_user`). A
+The ego owes a plan that stays clear of where pedestrians may be (`shield.junctions.judge.judge_user`). A
 pedestrian owes to stay within what it could reach when the last such plan was there, on the crossing if it was on one,
 and not to walk into a car. Who came out of hiding faster than is reasonable is to blame for what follows; toward
 whoever else comes out the ego must have a plan when it sees them.

@@ -13,9 +13,10 @@ from rss_shield.envs.roads.lanes import road_through
 from rss_shield.envs.worlds.random_roads import Element, Pose, Tailgater, advance, lane_beside
 from rss_shield.shield.command import Command
 from rss_shield.shield.geometry import locate
-from rss_shield.shield.lanes.controller import Body, always_on, restrict
 from rss_shield.shield.lanes.frame import Bend, look_ahead, to_lane_frame
+from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.restriction import Body, restrict
 from rss_shield.shield.params import Table
 
 TABLE = PRESETS["simulator"]

@@ -11,7 +11,7 @@ from rss_shield import make
 from rss_shield.envs.highway.compliant import GAP, CompliantDriver, TurnTaker, shield_of
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.shield.junctions.conflict_areas import CELL
-from rss_shield.shield.junctions.controller import ASSERTIVE, CAUTIOUS, PRIORITY
+from rss_shield.shield.junctions.memory import ASSERTIVE, CAUTIOUS, PRIORITY
 from rss_shield.shield.junctions.plans import ANY, KNOWN
 from rss_shield.shield.verdicts import OTHER
 

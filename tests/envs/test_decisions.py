@@ -8,9 +8,9 @@ from rss_shield.envs.decisions.executed import executed_actions
 from rss_shield.envs.decisions.foresight import Aim, Seen, first_response, make_stage
 from rss_shield.envs.decisions.masks import FASTER, IDLE, LANE_LEFT, LANE_RIGHT, SLOWER, allow
 from rss_shield.envs.decisions.replacement import NEAREST, order_of, replace
-from rss_shield.shield.lanes.controller import Body
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.restriction import Body
 from rss_shield.shield.params import PRESETS, Rules, Table
 
 ALL = np.arange(5)

@@ -9,7 +9,7 @@ from rss_shield.envs.highway.around import around
 from rss_shield.envs.highway.ego import Look
 from rss_shield.envs.highway.explained import LINE, line_of
 from rss_shield.shield.command import Command
-from rss_shield.shield.lanes.controller import RESPONSE_BRAKE
+from rss_shield.shield.lanes.responses import RESPONSE_BRAKE
 
 CONFIG = {"vehicles_count": 15, "duration": 10}
 

@@ -9,7 +9,7 @@ from rss_shield import make, make_vec
 from rss_shield.envs.roads.paths import STOCK, _starts, drive
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, junction_of, list_threats, track_of
 from rss_shield.shield.junctions.conflict_areas import cell_of, reach_beyond
-from rss_shield.shield.junctions.controller import CROSSING, SAMPLE
+from rss_shield.shield.junctions.memory import CROSSING, SAMPLE
 from rss_shield.shield.junctions.plans import ANY
 from rss_shield.shield.junctions.reach import THREAT
 

@@ -12,7 +12,7 @@ from junction_world import DT, RULED, junction
 import rss_shield
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, drift_of, track_of
 from rss_shield.shield.junctions.conflict_areas import COS, HALF_LENGTH, HALF_WIDTH, SIN, X, Y
-from rss_shield.shield.junctions.controller import block
+from rss_shield.shield.junctions.obstacles import block
 from rss_shield.shield.junctions.plans import NEVER, SLACK, Scene, stop_conflict
 from rss_shield.shield.junctions.reach import THREAT
 

@@ -7,7 +7,7 @@ from junction_world import DT, Duel, crossing_pairs, junction, verdict_of
 
 from rss_shield import make
 from rss_shield.shield.junctions.conflict_areas import cell_of
-from rss_shield.shield.junctions.controller import ASSERTIVE, CAUTIOUS
+from rss_shield.shield.junctions.memory import ASSERTIVE, CAUTIOUS
 from rss_shield.shield.junctions.plans import PATIENCE, START_UP
 from rss_shield.shield.junctions.reach import STANDING
 

@@ -14,9 +14,10 @@ from rss_shield.shield import sampling  # noqa: E402
 from rss_shield.shield.command import Command  # noqa: E402
 from rss_shield.shield.definitions import kinematics, lateral, longitudinal, response, right_of_way  # noqa: E402
 from rss_shield.shield.lanes import anticipation  # noqa: E402
-from rss_shield.shield.lanes.controller import Body, always_on, restrict  # noqa: E402
+from rss_shield.shield.lanes.limits import always_on  # noqa: E402
 from rss_shield.shield.lanes.memory import MEMORY, merge  # noqa: E402
 from rss_shield.shield.lanes.pair import ROAD_USER, assess  # noqa: E402
+from rss_shield.shield.lanes.restriction import Body, restrict  # noqa: E402
 from rss_shield.shield.params import RSSParams, Rules, Table  # noqa: E402
 
 FRAME = 1 / 8  # a number of binary digits: sums of frames are exact [s]

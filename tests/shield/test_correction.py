@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from rss_shield.shield.command import Command
-from rss_shield.shield.lanes.controller import Body, Danger, Response, always_on, respond, restrict
+from rss_shield.shield.lanes.controller import Danger, Response, respond
 from rss_shield.shield.lanes.correction import in_full
+from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.memory import Bounds
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.restriction import Body, restrict
 from rss_shield.shield.params import PRESETS, Rules
 
 DT = 0.2

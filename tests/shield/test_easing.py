@@ -5,10 +5,10 @@ import pytest
 from junction_world import DT, EGO, Duel, crossing_pairs
 
 from rss_shield import make
-from rss_shield.shield.junctions.controller import limit
 from rss_shield.shield.junctions.easing import approach_cap, caps
+from rss_shield.shield.junctions.limits import limit
 from rss_shield.shield.junctions.plans import NEVER, SLACK, go_plan, plan_conflict, stop_conflict, throttle
-from rss_shield.shield.lanes.controller import RESPONSE_BRAKE
+from rss_shield.shield.lanes.responses import RESPONSE_BRAKE
 from rss_shield.shield.params import Rules
 
 RATE = Rules().anticipation

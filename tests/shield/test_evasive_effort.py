@@ -6,10 +6,11 @@ import pytest
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.evasion import Motion, follow
 from rss_shield.shield.definitions.response import LON
-from rss_shield.shield.lanes.controller import Body, always_on
 from rss_shield.shield.lanes.evasion import FAMILY, HORIZON, Room, evade, manoeuvre
+from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.restriction import Body
 from rss_shield.shield.params import PRESETS, Rules
 from rss_shield.shield.table import table_for
 from rss_shield.shield.verdicts import KEPT, TOO_SHORT

@@ -9,7 +9,6 @@ from junction_world import RULED, arms, crossing_pairs, junction
 
 from rss_shield import make, make_vec
 from rss_shield.shield.junctions.conflict_areas import cell_of
-from rss_shield.shield.junctions.controller import SAMPLE
 from rss_shield.shield.junctions.examined import (
     ALL,
     EXAMINED,
@@ -22,6 +21,7 @@ from rss_shield.shield.junctions.examined import (
     examine,
 )
 from rss_shield.shield.junctions.examined import TABLE as TABLE_ONLY
+from rss_shield.shield.junctions.memory import SAMPLE
 from rss_shield.shield.junctions.plans import SLACK, Scene, Track
 from rss_shield.shield.junctions.reach import THREAT
 

@@ -10,7 +10,8 @@ from junction_world import DT, EGO, TABLE, Duel, arms, crossing_pairs, junction
 from rss_shield import make_vec
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, list_threats
 from rss_shield.shield.junctions.conflict_areas import cell_of
-from rss_shield.shield.junctions.controller import CROSSING, SAMPLE, judge_crossing
+from rss_shield.shield.junctions.judge import judge_crossing
+from rss_shield.shield.junctions.memory import CROSSING, SAMPLE
 from rss_shield.shield.junctions.plans import ANY, Track
 from rss_shield.shield.junctions.reach import THREAT, farthest
 from rss_shield.shield.verdicts import CUT_IN, DUTIES, INHERITED, KEPT, LEFT_NO_PLAN, NOBODY, OTHER, TOO_FAR, TOO_HARD

@@ -19,9 +19,11 @@ from rss_shield.shield.filters.answer import (
 )
 from rss_shield.shield.filters.leader import Leader, leader_of
 from rss_shield.shield.filters.once_per_decision import is_dangerous
-from rss_shield.shield.lanes.controller import Body, always_on, find_danger
+from rss_shield.shield.lanes.controller import find_danger
+from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.restriction import Body
 from rss_shield.shield.params import PRESETS, Rules, Table
 
 DT = 0.2

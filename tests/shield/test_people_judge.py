@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rss_shield.shield.definitions.pedestrians import WALKS
-from rss_shield.shield.junctions.controller import CROSSING
+from rss_shield.shield.junctions.memory import CROSSING
 from rss_shield.shield.people.judge import WATCHED, Seen, judge_exposure, watch_person
 from rss_shield.shield.verdicts import DUTIES, HURRIED, KEPT, LEAPED, LEFT_CROSSING, NO_CAUTION, UNREASONABLE, WALKED_IN
 

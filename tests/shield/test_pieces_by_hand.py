@@ -13,9 +13,9 @@ from rss_shield.shield._numba.compiled import compiled
 from rss_shield.shield.definitions.response import LAT, LON, NEITHER
 from rss_shield.shield.geometry import make_road
 from rss_shield.shield.junctions.reach import THREAT, farthest, fastest, nearest
-from rss_shield.shield.lanes.controller import always_on
 from rss_shield.shield.lanes.frame import to_lane_frame
 from rss_shield.shield.lanes.judge import judge_contact
+from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.memory import MEMORY, forget_safe
 from rss_shield.shield.lanes.pair import ROAD_USER, leading_speed, toward
 from rss_shield.shield.params import PRESETS, Rules, Table

@@ -7,14 +7,9 @@ from junction_world import DT, EGO, RULED, TABLE, Duel, arms, crossing_pairs, ju
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, _fitting
 from rss_shield.shield._numba.compiled import compiled
 from rss_shield.shield.junctions.conflict_areas import CELL, FAR, cell_of
-from rss_shield.shield.junctions.controller import (
-    ASSERTIVE,
-    CAUTIOUS,
-    CROSSING,
-    PRIORITY,
-    sort_out,
-)
+from rss_shield.shield.junctions.followers import sort_out
 from rss_shield.shield.junctions.frame_by_frame import go_frame_by_frame, stop_frame_by_frame
+from rss_shield.shield.junctions.memory import ASSERTIVE, CAUTIOUS, CROSSING, PRIORITY
 from rss_shield.shield.junctions.plans import (
     NEVER,
     SLACK,

@@ -19,8 +19,8 @@ from rss_shield.envs.options import PLANS, WAITING, Settings
 from rss_shield.envs.worlds.signalised import SignalisedRoad, compile_signal
 from rss_shield.eval.suite.judge.contacts import near_pairs, touches
 from rss_shield.eval.suite.judge.world import World
-from rss_shield.shield.junctions.controller import ENTRIES
 from rss_shield.shield.junctions.examined import EXAMINED
+from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.params import Table
 from rss_shield.shield.trace import Trace

@@ -24,11 +24,12 @@ from rss_shield.eval.suite.scenarios.drivers_of_r157 import (
 from rss_shield.shield._numba.compiled import compiled_for_arrays
 from rss_shield.shield.command import Command
 from rss_shield.shield.geometry import largest_half_extents
-from rss_shield.shield.lanes.controller import Body, find_danger, respond
+from rss_shield.shield.lanes.controller import find_danger, respond
 from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.judge import judge_frame
 from rss_shield.shield.lanes.memory import MEMORY
 from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.restriction import Body
 from rss_shield.shield.params import PRESETS, Preset, Rules
 from rss_shield.shield.table import table_for
 

@@ -14,7 +14,7 @@ from rss_shield.envs.highway.step import begin_step
 from rss_shield.envs.options import LANES, Settings
 from rss_shield.envs.roads.slip import steering_of
 from rss_shield.shield.definitions.response import AXES
-from rss_shield.shield.lanes.controller import response_name
+from rss_shield.shield.lanes.responses import response_name
 from rss_shield.shield.params import RSSParams, Rules, Table
 from rss_shield.shield.trace import Trace
 

@@ -1,0 +1,192 @@
+"""Who broke a duty at a junction (Def. 27)."""
+
+import numpy as np
+
+from rss_shield.shield._numba.compiled import apart, compiled, inner
+from rss_shield.shield.junctions.followers import is_behind
+from rss_shield.shield.junctions.limits import limit
+from rss_shield.shield.junctions.plans import ANYWHERE, NEVER, STOP, look_ahead, stop_conflict
+from rss_shield.shield.junctions.reach import STANDING
+from rss_shield.shield.junctions.toward_one import alone_with, is_resolute, leaves_plan_toward, plans_and_duty
+from rss_shield.shield.verdicts import (
+    ACCELERATED,
+    BRAKED,
+    CRASHED,
+    CUT_IN,
+    GAVE_NO_WAY,
+    KEPT,
+    LEFT_NO_PLAN,
+    LEFT_PATHS,
+    OTHER,
+    REVERSED,
+    TOO_FAR,
+    TOO_HARD,
+    TRAPPED,
+    WAVERED,
+    judged,
+    who_broke,
+)
+
+_TOLERANCE = 1e-6
+_REVERSING = 0.1  # slower than this backwards is standing [m/s]
+_JITTER = 0.02  # speeds of others are read off a simulator that integrates in steps [m/s]
+
+
+@compiled
+def judge_user(scene, i, sample, memory, a, clear, trapped):
+    """Take in one sample of one road user and judge the ego's acceleration toward it.
+
+    Args:
+      scene: `Scene`.
+      i: index of the road user; sample: its SAMPLE; memory: its CROSSING, changed in place.
+      a: acceleration that the ego executes on this frame [m/s^2].
+      clear: a plan that stays clear of everybody is known to remain afterwards.
+      trapped: no plan stays clear of everybody, because somebody appeared or left the bounds. Duties
+        toward several then contradict each other: what is owed is to brake, or to go on, with all it has.
+
+    Returns:
+      (dangerous, kept): is the ego not free toward this road user, and did it keep its duty? A contact is
+      judged more strictly: whoever left itself no plan toward the other is to blame, unless somebody's breach has
+      trapped it (`note_who_trapped`).
+    """
+    _judge_motion(sample, memory, scene.table.other, scene.table.dt)
+    memory.was_lawless = memory.other_broke != KEPT
+    scene = alone_with(scene, i)
+    memory.stood = memory.stood + 1 if abs(sample.speed) < STANDING and not sample.alert else 0
+    memory.counted_on = memory.counted_on + 1 if _counts_on_standing(scene, i, a) else 0
+    may_follow, follows, gap_is_safe = is_behind(scene, i)
+    dangerous, kept, items, cut_in = False, True, STOP, False
+    followed, memory.behind = memory.behind, may_follow and (memory.behind or gap_is_safe)
+    if not follows:
+        strongest = max(limit(scene.table.ego.a_max_accel, scene.track.v, scene.table.ego, scene.table.dt), a)
+        if stop_conflict(scene, strongest, i, ANYWHERE, 0.0) != NEVER:
+            dangerous = True
+            if not clear:
+                items, kept = plans_and_duty(scene, i, a)
+        had_plan = memory.age > 0 and memory.since == 0 and not followed
+        cut_in = items == 0 and had_plan and memory.way != scene.track.path and memory.other_broke == KEPT
+    if may_follow and not memory.behind:
+        items = 0
+    too_hard = may_follow and a < -scene.table.ego.a_max_brake - _TOLERANCE
+    if too_hard and not gap_is_safe:
+        dangerous, kept = True, False
+    if items != 0:
+        memory.items, memory.since = items, 0
+        memory.other_broke, memory.other_excess = KEPT, 0.0
+        # having braked too hard in front of a follower counts until that has its distance again
+        if memory.ego_broke != TOO_HARD or gap_is_safe or not may_follow:
+            memory.ego_broke, memory.ego_excess = KEPT, 0.0
+    else:
+        memory.since += 1
+        if followed and not may_follow and memory.other_broke == KEPT:
+            memory.other_broke = TOO_FAR  # their ways part, and it had not kept its distance
+    if cut_in:
+        kept = False
+        memory.ego_broke = CUT_IN
+    if memory.ego_broke == KEPT and (too_hard or not kept):
+        memory.ego_broke = TOO_HARD if too_hard else LEFT_NO_PLAN if items != 0 else WAVERED
+        memory.ego_excess = abs(a)
+    if trapped and not kept and not cut_in:
+        kept = is_resolute(scene, a)
+    memory.follows, memory.way = may_follow, scene.track.path
+    memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
+    memory.reachable, memory.path, memory.ways = sample.reachable, sample.path, sample.ways
+    memory.wreck, memory.astray = sample.wreck, sample.astray
+    memory.age += 1
+    memory.relied, memory.relied_before = False, memory.relied
+    return dangerous, kept
+
+
+@inner
+def _judge_motion(sample, memory, other, dt):
+    """Did a road user leave the bounds that plans assume, since the last sample?"""
+    if memory.age == 0:
+        return
+    faster = sample.speed - max(memory.speed, min(memory.speed + other.a_max_accel * dt, other.v_cap))
+    slower = memory.speed - other.a_max_brake * dt - sample.speed
+    duty, excess = KEPT, 0.0
+    moved = np.hypot(sample.x - memory.x, sample.y - memory.y)
+    if sample.wreck and (not memory.wreck or moved > _JITTER * dt):
+        duty = CRASHED
+    elif _leaves_paths(sample, memory):
+        duty = LEFT_PATHS
+    elif faster > _JITTER and not sample.wreck:
+        duty, excess = ACCELERATED, faster / dt
+    elif slower > _JITTER and not sample.wreck:
+        duty, excess = BRAKED, slower / dt
+    elif sample.speed < -_REVERSING:
+        duty, excess = REVERSED, -sample.speed
+    elif memory.relied_before or (memory.counted_on > 0 and abs(sample.speed) >= STANDING):
+        duty = GAVE_NO_WAY  # forgotten by `judge_user` if the ego still has a plan
+    if duty != KEPT and memory.other_broke == KEPT:
+        memory.other_broke, memory.other_excess = duty, excess
+
+
+@inner
+def _leaves_paths(sample, memory):
+    """Has a road user gone where none of its ways leads? Who is off all of them is expected to stand, or to come back.
+
+    So whoever drives on there has left them anew on every sample, also one that has never been on any (J12).
+    """
+    off = sample.astray and not (memory.astray and abs(sample.speed) < STANDING)
+    return off or sample.strays or sample.lanes & ~memory.lanes != 0
+
+
+@apart
+def _counts_on_standing(scene, i, a):
+    """Has the ego no plan after its acceleration, but one that counts on a road user to stand?"""
+    stands_for = scene.threats[0].stands_for if len(scene.threats) > 0 else 0.0  # the same on all its ways
+    if stands_for == 0.0:
+        return False
+    _count_on(scene, 0.0)
+    counts = not leaves_plan_toward(scene, i, a)
+    _count_on(scene, stands_for)
+    return counts
+
+
+@inner
+def _count_on(scene, stands_for):
+    for k in range(len(scene.threats)):
+        scene.threats[k].stands_for = stands_for
+        look_ahead(scene, scene.threats[k])
+
+
+@inner
+def note_who_trapped(plan, memory, trapped, resolute):
+    """Whoever broke a duty and so trapped the ego is to blame for contacts with those toward whom no plan is left.
+
+    They may have done nothing wrong, and the ego had to break its plans toward somebody (hole H24): that it did is no
+    fault of its own, as long as it is `resolute`.
+    """
+    if not trapped:
+        plan.wronged = False
+        return
+    for i in range(len(memory)):
+        plan.wronged |= memory[i].was_lawless
+    for i in range(len(memory)):
+        if plan.wronged and resolute and memory[i].since == 0 and memory[i].ego_broke == LEFT_NO_PLAN:
+            memory[i].ego_broke, memory[i].ego_excess = KEPT, 0.0
+        if plan.wronged and memory[i].since == 1 and memory[i].other_broke == KEPT:
+            memory[i].other_broke = TRAPPED
+
+
+@apart
+def judge_crossing(sample, memory, outside, other, dt):
+    """Verdict at the first contact with one road user (Def. 27).
+
+    Args:
+      sample: SAMPLE at the sample at which there is contact or it is predicted.
+      memory: CROSSING after the one before.
+      outside: does it reach beyond what cars sweep on every way it may take?
+
+    Returns:
+      `Verdict`.
+    """
+    _judge_motion(sample, memory, other, dt)
+    if outside and memory.other_broke == KEPT:
+        memory.other_broke = LEFT_PATHS
+    if memory.behind and memory.ego_broke == KEPT:
+        if memory.other_broke == KEPT:
+            memory.other_broke = TOO_FAR
+        return judged(OTHER, memory.items, memory)
+    return judged(who_broke(memory, memory.items == 0), memory.items, memory)

@@ -1,0 +1,161 @@
+"""The command nearest to the nominal one inside given bounds: acceleration and slip angle."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield.command import Command
+from rss_shield.shield.lanes.frame import beyond
+from rss_shield.shield.lanes.pair import STANDSTILL
+
+_STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
+
+
+class Body(NamedTuple):
+    """What the ego's kinematics add to its `ROAD_USER` record."""
+
+    half_wheelbase: float  # distance from the centre to the rear axle [m]
+    max_slip: float  # largest slip angle the steering reaches [rad]
+    curvature: float  # of the lane under the ego, see `shield.lanes.frame.Bend` [1/m]
+    slack: float = 0.0  # likewise [rad]
+    backs_up: bool = False  # its driver asks for reverse by braking at standstill; others only hold then
+
+
+@compiled
+def restrict(nominal, bounds, ego, body, rules, dt):
+    """The command nearest to the nominal one inside the bounds."""
+    a = min(max(nominal.acceleration, bounds.a_lower), bounds.a_upper)
+    if bounds.a_lower > -np.inf or bounds.a_upper < 0.0:
+        a = max(a, _least_acceleration(nominal.acceleration, bounds, ego.speed, body, dt))
+    return Command(a, _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt))
+
+
+@inner
+def _least_acceleration(nominal, bounds, v, body, dt):
+    """No braking goes on behind standstill, unless the driver asks for reverse then: its last step is partial."""
+    v_next = v + min(nominal, abs(bounds.a_upper)) * dt
+    if v > STANDSTILL or not body.backs_up or (v > -STANDSTILL and v_next > -STANDSTILL):
+        return -max(v, 0.0) / dt
+    return (max(bounds.v_lower, min(v_next, 0.0)) - v) / dt
+
+
+@inner
+def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
+    """Slip angle nearest to the nominal one inside the lateral bounds [rad].
+
+    With psi the heading relative to the lane, slip beta moves the car sideways at v sin(psi + beta)
+    at once and turns it by G sin(beta), G = v dt / half_wheelbase. For G > 1 the heading overshoots,
+    for G > 2 holding the lateral speed alone makes it diverge: so the lateral speed of this frame, the
+    one that the next heading commits to, the course and the heading are bounded together. Their
+    intervals always share the slip that straightens the car (see `_straightening_slip`): it moves
+    the car no faster than its heading already does, so no bound that was kept so far is lost.
+    """
+    v = ego.speed
+    if abs(v) < STANDSTILL or (bounds.left == np.inf and bounds.right == np.inf):
+        return slip
+    if v < 0.0:
+        return _restrict_slip_backwards(slip, bounds, ego, body, rules, dt)
+    v_next = max(v + a * dt, STANDSTILL)
+    psi, gain = ego.heading, v * dt / body.half_wheelbase
+    turned = body.curvature * v * dt  # the lane turns under the car during the frame ...
+    drift = 0.5 * turned * v  # ... and curves away from its tangent [m/s]
+    psi_next = psi + gain * np.sin(slip) - turned
+    permitted = _is_permitted(psi + slip, psi_next, body.slack, v, v_next, drift, bounds, rules)
+    if permitted and abs(slip) <= body.max_slip:
+        return slip
+    neutral = _straightening_slip(psi, turned, drift, gain, v, v_next, bounds)
+
+    # lateral speed of this frame: -left <= v sin(psi + slip) - drift <= right
+    low = min(_arcsin((-bounds.left + drift) / v) - psi, neutral)
+    high = max(_arcsin((bounds.right + drift) / v) - psi, neutral)
+    # heading after this frame, by the speed it commits to and by the heading bound
+    psi_low = _arcsin(-bounds.left_next / v_next) + min(body.slack, 0.0)
+    psi_high = _arcsin(bounds.right_next / v_next) + max(body.slack, 0.0)
+    if rules.heading_bound < 1.0:
+        # the course, slip included, keeps the bound too: a leader's way along the lane relies on it
+        largest = np.arcsin(rules.heading_bound)
+        low, high = max(low, min(-largest - psi, neutral)), min(high, max(largest - psi, neutral))
+        psi_low, psi_high = max(psi_low, -largest), min(psi_high, largest)
+    low = max(low, min(_arcsin((psi_low - psi + turned) / gain), neutral))
+    high = min(high, max(_arcsin((psi_high - psi + turned) / gain), neutral))
+    low, high = max(low, -body.max_slip), min(high, body.max_slip)
+    return min(max(slip, low), high)
+
+
+@inner
+def _restrict_slip_backwards(slip, bounds, ego, body, rules, dt):
+    """The same in reverse: first the lateral speed of this frame, then the heading.
+
+    The slip that ends the sideways motion turns the car farther from the lane there, by v dt / half_wheelbase of its
+    angle. So a car that has to stop moving sideways also stops backing up, and comes to rest before that matters: until
+    then its side sweeps no more than the speed at its angle to the lane does, which is less than its share (Def. 6).
+    """
+    v, psi, gain = ego.speed, ego.heading, ego.speed * dt / body.half_wheelbase
+    turned = body.curvature * v * dt
+    drift = 0.5 * turned * v
+    low, high = _arcsin((bounds.right + drift) / v) - psi, _arcsin((-bounds.left + drift) / v) - psi
+    if rules.heading_bound < 1.0:
+        largest = np.arcsin(rules.heading_bound)
+        straight_low = _arcsin((largest - psi + turned) / gain)
+        straight_high = _arcsin((-largest - psi + turned) / gain)
+        low, high = min(max(low, straight_low), high), max(min(high, straight_high), low)
+    low, high = max(low, -body.max_slip), min(high, body.max_slip)
+    return min(max(slip, low), high)
+
+
+@inner
+def _is_permitted(course, psi_next, slack, v, v_next, drift, bounds, rules):
+    """Do course and next heading [rad] keep all bounds? The bounds in closed form, without solving for the slip."""
+    if abs(course) >= _STEEP or abs(psi_next) >= _STEEP:
+        return False
+    sin, sin_next, sin_committed = np.sin(course), np.sin(psi_next), np.sin(beyond(psi_next, slack))
+    steepest = rules.heading_bound
+    return (
+        -bounds.left <= v * sin - drift <= bounds.right
+        and -bounds.left_next <= v_next * sin_committed <= bounds.right_next
+        and abs(sin) <= steepest
+        and abs(sin_next) <= steepest
+    )
+
+
+@compiled
+def straighten(ego, a, bounds, body, dt):
+    """Slip angle that ends the sideways motion of a car that drives forward [rad]; 0 for one that does not.
+
+    Args:
+      ego: `ROAD_USER` record.
+      a: its acceleration on this frame [m/s^2].
+      bounds: `Bounds`.
+      body: `Body`.
+      dt: length of a frame [s].
+    """
+    v = ego.speed
+    if v < STANDSTILL:
+        return 0.0
+    turned = body.curvature * v * dt
+    v_next = max(v + a * dt, STANDSTILL)
+    return _straightening_slip(ego.heading, turned, 0.5 * turned * v, v * dt / body.half_wheelbase, v, v_next, bounds)
+
+
+@inner
+def _straightening_slip(psi, turned, drift, gain, v, v_next, bounds):
+    """Slip that ends the sideways motion [rad].
+
+    For G <= 1 the lateral speed itself is set to 0 and the heading follows by the factor 1 - G.
+    Beyond, the heading is set as the lane asks, and the lateral speed shrinks by 1 - 1/G on the way. While
+    G < 2 the heading still calms down by itself, and the lateral speed keeps its bound first.
+    """
+    if gain <= 1.0:
+        return _arcsin(drift / v) - psi
+    along = _arcsin(drift * v_next / v**2) - _arcsin(turned / gain)  # heading of a car that keeps to the bend
+    slip = _arcsin((turned - psi + along) / gain)
+    if gain < 2.0:
+        u = v * np.sin(psi + slip) - drift
+        slip = _arcsin((min(max(u, -bounds.left), bounds.right) + drift) / v) - psi
+    return slip
+
+
+@inner
+def _arcsin(x):
+    return np.arcsin(min(max(x, -1.0), 1.0))
