@@ -31,7 +31,7 @@ from rss_shield.eval.files import atomic, write_json
 from rss_shield.eval.pages import markdown, spaced, write_page
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.stats import Interval, bootstrap_mean, wilson
-from rss_shield.shield.definitions.unstructured import Mover
+from rss_shield.shield.definitions.occupancy import Mover
 from rss_shield.shield.geometry import wrap_angle
 from rss_shield.shield.open_space.controller import WORK, open_space_frame
 from rss_shield.shield.open_space.frames import CAR, LOT

@@ -8,15 +8,8 @@ import pytest
 
 from rss_shield import PRESETS, d_min_lateral, d_min_opposite_direction, d_min_same_direction, make
 from rss_shield.envs.highway.ego import ShieldedEgo
-from rss_shield.shield.definitions.unstructured import (
-    DANGEROUS,
-    ROW_FIELDS,
-    VEHICLE,
-    Mover,
-    Occupancy,
-    occupy,
-    who_brakes,
-)
+from rss_shield.shield.definitions.occupancy import ROW_FIELDS, VEHICLE, Mover, Occupancy, occupy
+from rss_shield.shield.definitions.unstructured import DANGEROUS, who_brakes
 from rss_shield.shield.risk import RiskSettings, marking, road_users, scene_risk
 
 PAIRS = 10_000

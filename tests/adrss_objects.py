@@ -53,7 +53,7 @@ def become(one, params, lon=0.0, lat=0.0):
 
 
 def open_space_pair(params, ego, other):
-    """A pair of road users in open space (of `shield.definitions.unstructured.Mover`) as the library wants it."""
+    """A pair of road users in open space (of `shield.definitions.occupancy.Mover`) as the library wants it."""
     pair = rss.core.RelativeConstellation()
     pair.constellation_id, pair.ego_id, pair.object_id = 1, 1, 2
     pair.constellation_type = rss.world.ConstellationType.Unstructured

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield.definitions.unstructured import ANY_WAY, BACKWARDS, Mover
+from rss_shield.shield.definitions.occupancy import ANY_WAY, BACKWARDS, Mover
 
 
 class Track(NamedTuple):

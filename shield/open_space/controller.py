@@ -7,7 +7,7 @@ import numpy as np
 from rss_shield.shield._numba.compiled import compiled, part
 from rss_shield.shield.comfort import gap_in_way
 from rss_shield.shield.definitions.kinematics import time_to_collision
-from rss_shield.shield.definitions.unstructured import MAX_STEPS, ROW_FIELDS
+from rss_shield.shield.definitions.occupancy import MAX_STEPS, ROW_FIELDS
 from rss_shield.shield.geometry import turned_half_extents
 from rss_shield.shield.lanes.responses import RESPONSE_BRAKE, RESPONSE_STEER
 from rss_shield.shield.open_space.frames import (

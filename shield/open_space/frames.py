@@ -1,6 +1,6 @@
 """What a road user may occupy where a simulator moves everybody in whole frames: Def. 21, sampled.
 
-The definition is about continuous time (`definitions.unstructured`). highway-env moves a car frame by frame with the
+The definition is about continuous time (`definitions.occupancy`). highway-env moves a car frame by frame with the
 speed that it has at the start of the frame, and turns its wheels at once. Two things make that easy to bound:
 
 - the middle of a car's rear end moves along the heading, whatever the wheels do, because the slip of highway-env's
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, part
-from rss_shield.shield.definitions.unstructured import (
+from rss_shield.shield.definitions.occupancy import (
     ANEW,
     COS_LEFT,
     COS_RIGHT,

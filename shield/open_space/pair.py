@@ -15,16 +15,14 @@ last way out that it had. Three cases cover who is safe from whom, by the last f
 import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, part
+from rss_shield.shield.definitions.occupancy import HI, LO, WIDER
+from rss_shield.shield.definitions.separation import steps_apart
+from rss_shield.shield.definitions.trajectories import angle_away
 from rss_shield.shield.definitions.unstructured import (
     BOTH_BRAKE,
     DANGEROUS,
     FIRST_BRAKES,
-    HI,
-    LO,
     SECOND_BRAKES,
-    WIDER,
-    angle_away,
-    steps_apart,
     turn_to_drive_away,
     who_brakes,
     who_stays,

@@ -7,7 +7,7 @@ played with the simulator's equations, and written as an occupancy that holds no
 import numpy as np
 
 from rss_shield.shield._numba.compiled import part
-from rss_shield.shield.definitions.unstructured import (
+from rss_shield.shield.definitions.occupancy import (
     ANEW,
     COS_LEFT,
     COS_RIGHT,

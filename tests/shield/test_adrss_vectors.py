@@ -30,6 +30,7 @@ from rss_shield.shield.definitions.longitudinal import (
     d_min_same_direction,
     is_safe_longitudinally,
 )
+from rss_shield.shield.definitions.occupancy import VEHICLE, Mover, occupied
 from rss_shield.shield.definitions.response import (
     CORRECT,
     FRONT,
@@ -63,10 +64,7 @@ from rss_shield.shield.definitions.unstructured import (
     DRIVE_AWAY,
     GO_ON,
     STAY,
-    VEHICLE,
-    Mover,
     headings_away,
-    occupied,
     proper_response,
     turn_to_drive_away,
     who_brakes,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rss_shield.shield.definitions.unstructured import angle_away, do_not_collide, first_contact, stopping_sample
+from rss_shield.shield.definitions.trajectories import angle_away, do_not_collide, first_contact, stopping_sample
 
 TIME = np.linspace(0.0, 10.0, 101)
 NEVER = len(TIME)

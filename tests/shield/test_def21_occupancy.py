@@ -7,16 +7,16 @@ import pytest
 from open_space import drive, random_mover, support
 
 from rss_shield.shield.definitions.kinematics import reach
-from rss_shield.shield.definitions.unstructured import (
+from rss_shield.shield.definitions.occupancy import (
     CHANGES_GEAR,
     PEDESTRIAN,
     VEHICLE,
     Mover,
     Steering,
-    extent,
     occupied,
     trajectory,
 )
+from rss_shield.shield.definitions.separation import extent
 from rss_shield.shield.params import PRESETS
 
 CAR = PRESETS["ad-rss"].ego

@@ -7,22 +7,18 @@ import pytest
 from open_space import drive, random_mover, separation
 
 from rss_shield.shield.definitions.longitudinal import d_min_opposite_direction, d_min_same_direction
+from rss_shield.shield.definitions.occupancy import CHANGES_GEAR, PEDESTRIAN, VEHICLE, Mover, occupied
+from rss_shield.shield.definitions.separation import drives_away
 from rss_shield.shield.definitions.unstructured import (
     BOTH_BRAKE,
     BRAKE,
-    CHANGES_GEAR,
     DANGEROUS,
     DRIVE_AWAY,
     FIRST_BRAKES,
     GO_ON,
-    PEDESTRIAN,
     SECOND_BRAKES,
     STAY,
-    VEHICLE,
-    Mover,
-    drives_away,
     headings_away,
-    occupied,
     proper_response,
     turn_to_drive_away,
     who_brakes,

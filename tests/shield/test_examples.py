@@ -23,6 +23,7 @@ from rss_shield.shield.definitions.longitudinal import (
     is_safe_longitudinally,
 )
 from rss_shield.shield.definitions.occlusion import is_exonerated_by_mean_speed, mean_speed_until_contact, v_visible
+from rss_shield.shield.definitions.occupancy import VEHICLE, Mover, trajectory
 from rss_shield.shield.definitions.pedestrians import Walk, reach_ahead
 from rss_shield.shield.definitions.response import (
     CORRECT,
@@ -59,15 +60,7 @@ from rss_shield.shield.definitions.sensing import (
     relative_error,
     semantic_position,
 )
-from rss_shield.shield.definitions.unstructured import (
-    VEHICLE,
-    Mover,
-    angle_away,
-    do_not_collide,
-    first_contact,
-    stopping_sample,
-    trajectory,
-)
+from rss_shield.shield.definitions.trajectories import angle_away, do_not_collide, first_contact, stopping_sample
 from rss_shield.shield.geometry import half_extents, locate, make_road
 from rss_shield.shield.lanes.judge import judge_contact, judge_frame
 from rss_shield.shield.lanes.memory import MEMORY, remember

@@ -8,15 +8,9 @@ from highway_env.utils import are_polygons_intersecting
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.shield.definitions.longitudinal import d_min_opposite_direction, d_min_same_direction
-from rss_shield.shield.definitions.unstructured import (
-    BOTH_BRAKE,
-    DANGEROUS,
-    FIRST_BRAKES,
-    MAX_STEPS,
-    ROW_FIELDS,
-    extent,
-    who_brakes,
-)
+from rss_shield.shield.definitions.occupancy import MAX_STEPS, ROW_FIELDS
+from rss_shield.shield.definitions.separation import extent
+from rss_shield.shield.definitions.unstructured import BOTH_BRAKE, DANGEROUS, FIRST_BRAKES, who_brakes
 from rss_shield.shield.open_space.frames import (
     CAR,
     FIXED,

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 from open_space_duel import DT, TABLE, Shielded, Worst, duel, start
 
-from rss_shield.shield.definitions.unstructured import (
-    BOTH_BRAKE,
-    DANGEROUS,
-    FIRST_BRAKES,
-    SECOND_BRAKES,
-)
+from rss_shield.shield.definitions.unstructured import BOTH_BRAKE, DANGEROUS, FIRST_BRAKES, SECOND_BRAKES
 from rss_shield.shield.open_space.controller import WORK, Intended, open_space_frame
 from rss_shield.shield.open_space.frames import CAR, FIXED, LOT, PEDESTRIAN, USER
 from rss_shield.shield.open_space.judge import judge_motion, judge_touch

@@ -6,8 +6,9 @@ import pytest
 
 from rss_shield.shield.definitions.kinematics import time_to_collision
 from rss_shield.shield.definitions.occlusion import REASONABLE
+from rss_shield.shield.definitions.occupancy import VEHICLE, Mover, occupied
 from rss_shield.shield.definitions.sensing import joint_failure_bound, joint_miss_bound
-from rss_shield.shield.definitions.unstructured import VEHICLE, Mover, headings_away, occupied
+from rss_shield.shield.definitions.unstructured import headings_away
 from rss_shield.shield.params import PRESETS
 
 
