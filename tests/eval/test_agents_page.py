@@ -116,3 +116,25 @@ def test_the_page_and_its_figures_are_written(runs, tmp_path):
 def test_without_a_finished_run_there_is_no_page(tmp_path):
     with pytest.raises(ValueError, match="expected at least one finished run"):
         agents.write([tmp_path], tmp_path)
+
+
+def test_what_is_counted_per_decision_is_a_ratio_of_sums():
+    cell = pd.DataFrame({"train_seed": 0, "cost": [1.0, 3.0, 0.0, 2.0], "length": [10, 30, 20, 20]})
+    found = agents.per_decision(cell, "cost")
+    assert found.value == pytest.approx(6 / 80)
+    # residuals 0.25, 0.75, -1.5, 0.5 of mean length 20: standard deviation of the shares, over two
+    half = 1.96 * np.std([0.0125, 0.0375, -0.075, 0.025], ddof=1) / 2
+    assert (found.low, found.high) == pytest.approx((6 / 80 - half, 6 / 80 + half))
+
+
+def test_an_agent_that_pays_more_than_any_limit_is_said_not_to_meet_it():
+    prices = pd.DataFrame({"timesteps": [100], "measured": 0.3, "target": 0.01, "multiplier": 2.0, "train_seed": 0})
+    cells = {
+        ("ppo-lagrangian", "off"): pd.DataFrame({"train_seed": 0, "cost": [3.0, 2.9, 3.1], "length": 10}),
+        ("slower", "off"): pd.DataFrame({"train_seed": 0, "cost": [1.0, 0.9, 1.1], "length": 10}),
+        ("lazy", "off"): pd.DataFrame({"train_seed": 0, "cost": [9.0, 8.9, 9.1], "length": 10}),
+    }
+    in_training, tested, least = agents.sentences_on_costs(prices, cells)
+    assert "0.3000; its limit is 0.01; multiplier 2.00" in in_training
+    assert "it costs 0.3000" in tested and tested.endswith("it does not meet it.")
+    assert "`slower`" in least and "0.1000" in least
