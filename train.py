@@ -37,7 +37,7 @@ from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, default_preset, scheme_of
 from rss_shield.eval import drivers, removal
 from rss_shield.eval.arms import ARMS, FROM_OPTIONS, SHIELDED, Arm, arm_named, table
-from rss_shield.eval.config_option import split_arguments, with_values
+from rss_shield.eval.config_option import HYPERPARAMETERS, Keys, split_arguments, with_values
 from rss_shield.eval.jobs import Job, run_jobs
 from rss_shield.eval.replay import chosen, replay
 from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
@@ -183,6 +183,9 @@ class Config:
     """How often an agent is tested with and without the shield on its way through training, at most; 0: never."""
     removal_episodes: int = 50
     """Test episodes of each of these tests, in the engine, on seeds of their own."""
+    hyperparameters: ConfigFile = field(default_factory=dict)
+    """Of every arm's learner, instead of its own: a file as --config takes it, or single ones as
+    --hyperparameters.learning-rate 3e-4. results.json shows all."""
     n_envs: int = 128
     """Environments side by side in each training."""
     workers: int = os.cpu_count() or 1
@@ -260,11 +263,12 @@ def started(arguments: list[str]) -> tuple[Config, Path]:
       ValueError: the environment's configuration cannot be read, or options contradict those of the run.
     """
     options, values = split_arguments(arguments)
+    options, altered = split_arguments(options, HYPERPARAMETERS)
     config = parse(options, Config())
     check(config)
     before = recorded(config.runs_dir / config.name) if config.resume and config.name else None
     if before is None:
-        config = complete(config, values)
+        config = complete(config, values, altered)
         config = replace(config, name=config.name or run_name(config))
         before = recorded(config.runs_dir / config.name) if config.resume else None
     folder = config.runs_dir / config.name
@@ -274,7 +278,12 @@ def started(arguments: list[str]) -> tuple[Config, Path]:
         return replace(config, preset=preset_name(config)), folder
     stored = stored_config(before)
     config = parse(options, stored)
-    config = complete(replace(config, config={**stored.config, **config.config}), values)
+    config = replace(
+        config,
+        config={**stored.config, **config.config},
+        hyperparameters={**stored.hyperparameters, **config.hyperparameters},
+    )
+    config = complete(config, values, altered)
     config = replace(config, preset=preset_name(config))
     contradictions = [
         f"--{name.replace('_', '-')} {shown(now)} contradicts {shown(then)}"
@@ -288,9 +297,13 @@ def started(arguments: list[str]) -> tuple[Config, Path]:
     return config, folder
 
 
-def complete(config: Config, values: dict[tuple[str, ...], Any]) -> Config:
-    """Options that are all in range, the environment's configuration with its single values put in."""
+def complete(config: Config, values: dict[Keys, Any], altered: dict[Keys, Any]) -> Config:
+    """Options that are all in range, with single values put into the environment's configuration and learners."""
     check(config)
+    config = replace(config, hyperparameters=with_values(config.hyperparameters, altered, {}))
+    for arm in map(arm_named, config.arms):
+        if not arm.scripted:
+            learner(config, arm)
     if not (config.config or values):
         return config
     given = with_values(config.config, values, default_config(config.env_id))
@@ -428,7 +441,10 @@ def learner(config: Config, arm: Arm) -> Learner:
     """The learner of an arm."""
     fixed = {name: value for name, value in arm.settings.items() if name != FROM_OPTIONS}
     asked = {name: getattr(config, option) for name, option in arm.settings.get(FROM_OPTIONS, {}).items()}
-    return learner_of(arm.learner, **fixed, **asked)
+    try:
+        return learner_of(arm.learner, **fixed, **asked).with_hyperparameters(config.hyperparameters)
+    except ValueError as error:
+        raise ValueError(f"arm {arm.name}: {error}") from None
 
 
 def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, progress: Progress) -> None:

@@ -5,7 +5,8 @@ A learner is one file: `agents/ppo.py`, or one of `agents/baselines/`. It has a 
 
 import importlib
 import inspect
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from gymnasium.vector import VectorEnv
@@ -29,6 +30,25 @@ LEARNERS = {
     "sac": "rss_shield.agents.baselines.sac",
     "semantic-dqn": "rss_shield.agents.baselines.semantic_dqn",
 }
+# what a value lies between (itself excluded at the open end), and whether it is a whole number
+_OPEN, _WHOLE = math.ulp(0.0), True
+RANGES: dict[str, tuple[float, float, bool]] = {
+    "learning_rate": (_OPEN, math.inf, not _WHOLE),
+    "batch_size": (2, math.inf, _WHOLE),
+    "n_epochs": (1, math.inf, _WHOLE),
+    "gamma": (0, 1, not _WHOLE),
+    "gae_lambda": (0, 1, not _WHOLE),
+    "clip_range": (_OPEN, math.inf, not _WHOLE),
+    "ent_coef": (0, math.inf, not _WHOLE),
+    "vf_coef": (0, math.inf, not _WHOLE),
+    "max_grad_norm": (_OPEN, math.inf, not _WHOLE),
+    "buffer_size": (1, math.inf, _WHOLE),
+    "learning_starts": (0, math.inf, _WHOLE),
+    "gradient_steps": (1, math.inf, _WHOLE),
+    "tau": (_OPEN, 1, not _WHOLE),
+    "target_update_interval": (1, math.inf, _WHOLE),
+}
+_BLOCKS_DEPEND_ON = ("policy", "n_steps", "train_freq")
 _NO_HYPERPARAMETERS = ("seed", "device", "tensorboard_log", "verbose", "stats_window_size", "_init_setup_model")
 
 
@@ -54,23 +74,61 @@ class Learner(NamedTuple):
         rollout = self.rollout(n_envs, total_timesteps)
         return -(-total_timesteps // rollout) * rollout
 
-    def hyperparameters(self, n_envs: int, total_timesteps: int) -> dict[str, Any]:
-        """Everything that a training depends on, besides seed, device and environment."""
-        defaults: dict[str, Any] = {}
-        for kind in reversed(self.algorithm.__mro__):
+    def with_hyperparameters(self, changes: Mapping[str, Any]) -> "Learner":
+        """This learner with other arguments of its algorithm. A learning rate that falls begins at the one given.
+
+        Raises:
+          ValueError: the algorithm has no such argument, or its value is out of range.
+        """
+        if not changes:
+            return self
+        known = {*self.defaults(), *self.options(1, 1)} - {*_BLOCKS_DEPEND_ON, *_NO_HYPERPARAMETERS}
+        for name, value in changes.items():
+            if name not in known:
+                expected = ", ".join(sorted(known))
+                raise ValueError(f"hyperparameters.{name}: {self.algorithm.__name__} takes {expected}")
+            check_hyperparameter(name, value)
+        return self._replace(options=lambda n_envs, total: {**self.options(n_envs, total), **changes})
+
+    def defaults(self) -> dict[str, Any]:
+        """The arguments of the algorithm that have a value of their own."""
+        for kind in self.algorithm.__mro__:
             if not issubclass(kind, BaseAlgorithm):
                 continue
             parameters = inspect.signature(kind).parameters.values()
-            defaults = {p.name: p.default for p in parameters if p.default is not p.empty} or defaults
+            found = {p.name: p.default for p in parameters if p.default is not p.empty}
+            if found:
+                return found
+        return {}
+
+    def hyperparameters(self, n_envs: int, total_timesteps: int) -> dict[str, Any]:
+        """Everything that a training depends on, besides seed, device and environment."""
         return {
             "algorithm": f"{self.algorithm.__module__.split('.')[0]}.{self.algorithm.__name__}",
             "policy": "MlpPolicy",
-            **{name: value for name, value in defaults.items() if name not in _NO_HYPERPARAMETERS},
+            **{name: value for name, value in self.defaults().items() if name not in _NO_HYPERPARAMETERS},
             **self.options(n_envs, total_timesteps),
             **self.notes,
             "rollouts_per_block": self.rollouts_per_block(n_envs),
             "timesteps": self.rounded(n_envs, total_timesteps),
         }
+
+
+def check_hyperparameter(name: str, value: Any) -> None:
+    """Refuse a value that no algorithm takes.
+
+    Raises:
+      ValueError: names field, value and range.
+    """
+    if name not in RANGES or (name == "ent_coef" and isinstance(value, str) and value.startswith("auto")):
+        return
+    low, high, whole = RANGES[name]
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not low <= value <= high or math.isinf(value) or (whole and value != int(value)):
+        kind = "a whole number" if whole else "a number"
+        bounds = "> 0" if low == _OPEN else f">= {low:g}"
+        bounds += "" if high == math.inf else f" and <= {high:g}"
+        raise ValueError(f"hyperparameters.{name} = {value!r}: expected {kind} {bounds}")
 
 
 def learner_of(name: str, **settings: Any) -> Learner:

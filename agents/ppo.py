@@ -34,7 +34,7 @@ def learner() -> Learner:
 
 
 def lower_learning_rate(model: Any, total_timesteps: int) -> None:
-    model.lr_schedule = FloatSchedule(LEARNING_RATE * (1 - model.num_timesteps / total_timesteps))
+    model.lr_schedule = FloatSchedule(model.learning_rate * (1 - model.num_timesteps / total_timesteps))
 
 
 def options(n_envs: int, total_timesteps: int) -> dict[str, Any]:

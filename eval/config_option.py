@@ -1,4 +1,4 @@
-"""The option --config of a command line: a file, and single values under dotted names."""
+"""The option --config of a command line, and others like it: a file, and single values under dotted names."""
 
 import ast
 import json
@@ -11,7 +11,8 @@ import yaml
 
 from rss_shield.eval.files import plainly, to_json
 
-PREFIX = "--config."
+PREFIX, HYPERPARAMETERS = "--config.", "--hyperparameters."
+EXAMPLES = {PREFIX: "lanes-count 4", HYPERPARAMETERS: "gamma 0.95"}
 Keys = tuple[str, ...]  # of a nested value: ("observation", "type")
 
 
@@ -56,7 +57,7 @@ def _object(source: str, value: Any) -> dict[str, Any]:
     return value
 
 
-def split_arguments(arguments: Sequence[str]) -> tuple[list[str], dict[Keys, Any]]:
+def split_arguments(arguments: Sequence[str], prefix: str = PREFIX) -> tuple[list[str], dict[Keys, Any]]:
     """Take `--config.lanes-count 4` and the like out of a command line; the last value of a key wins.
 
     A value is what JSON or Python reads it as, else a text; several values are a list.
@@ -72,16 +73,16 @@ def split_arguments(arguments: Sequence[str]) -> tuple[list[str], dict[Keys, Any
     upcoming = list(arguments)
     while upcoming:
         option, equals, given = upcoming[0].partition("=")
-        if not option.startswith(PREFIX):
+        if not option.startswith(prefix):
             others.append(upcoming.pop(0))
             continue
         upcoming.pop(0)
         texts = [given] if equals else []
         while not equals and upcoming and not upcoming[0].startswith("--") and upcoming[0] != "-h":
             texts.append(upcoming.pop(0))
-        keys = tuple(option.removeprefix(PREFIX).replace("-", "_").split("."))
+        keys = tuple(option.removeprefix(prefix).replace("-", "_").split("."))
         if not texts or not all(keys):
-            raise ValueError(f"{option}: expected a key and a value, as in {PREFIX}lanes-count 4")
+            raise ValueError(f"{option}: expected a key and a value, as in {prefix}{EXAMPLES[prefix]}")
         parsed = [_value(text) for text in texts]
         values[keys] = parsed[0] if len(parsed) == 1 else parsed
     return others, values

@@ -8,7 +8,7 @@ agent is to learn by itself what the shield would enforce; nothing overrides it.
 A second critic learns the discounted cost. PPO then follows (A_reward - multiplier * A_cost) / (1 + multiplier).
 """
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -72,7 +72,9 @@ class LagrangianPPO(PPO):
         inputs = int(np.prod(self.observation_space.shape or (1,)))
         layers = [nn.Linear(inputs, HIDDEN), nn.Tanh(), nn.Linear(HIDDEN, HIDDEN), nn.Tanh(), nn.Linear(HIDDEN, 1)]
         self.cost_critic = nn.Sequential(nn.Flatten(), *layers).to(self.device)
-        self.cost_optimizer = torch.optim.Adam(self.cost_critic.parameters(), lr=ppo.LEARNING_RATE, eps=1e-5)
+        self.cost_optimizer = torch.optim.Adam(
+            self.cost_critic.parameters(), lr=cast(float, self.learning_rate), eps=1e-5
+        )
 
     def collect_rollouts(self, env, callback, rollout_buffer, n_rollout_steps) -> bool:
         rollout_buffer.env = env

@@ -1,0 +1,67 @@
+"""Learners take other arguments of their algorithm, and refuse what it has not or cannot use."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from rss_shield.agents import ppo
+from rss_shield.agents.learner import learner_of
+from rss_shield.train import started
+
+
+def test_changed_arguments_reach_the_algorithm_and_the_record_and_the_rest_stays():
+    before = learner_of("ppo")
+    after = before.with_hyperparameters({"gamma": 0.95, "learning_rate": 3e-4, "use_sde": True})
+    old, new = before.options(128, 200_000), after.options(128, 200_000)
+    assert {name for name in new if new[name] != old.get(name)} == {"gamma", "learning_rate", "use_sde"}
+    record = after.hyperparameters(128, 200_000)
+    assert (record["gamma"], record["learning_rate"], record["use_sde"]) == (0.95, 3e-4, True)
+    assert before.options(128, 200_000) == old
+    assert after.rounded(128, 200_000) == before.rounded(128, 200_000)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("ppo", {"gama": 0.9}, "hyperparameters.gama: PPO takes batch_size, "),
+        ("dqn", {"clip_range": 0.2}, "hyperparameters.clip_range: SinglyDQN takes batch_size, buffer_size, "),
+        ("ppo", {"n_steps": 8}, "hyperparameters.n_steps: PPO takes "),
+        ("ppo", {"seed": 1}, "hyperparameters.seed: PPO takes "),
+        ("ppo", {"gamma": 1.5}, r"hyperparameters.gamma = 1.5: expected a number >= 0 and <= 1"),
+        ("ppo", {"learning_rate": 0.0}, r"hyperparameters.learning_rate = 0.0: expected a number > 0"),
+        ("ppo", {"learning_rate": float("nan")}, r"hyperparameters.learning_rate = nan: expected a number > 0"),
+        ("ppo", {"learning_rate": "auto"}, r"hyperparameters.learning_rate = 'auto': expected a number > 0"),
+        ("ppo", {"n_epochs": 2.5}, r"hyperparameters.n_epochs = 2.5: expected a whole number >= 1"),
+        ("ppo", {"n_epochs": True}, r"hyperparameters.n_epochs = True: expected a whole number >= 1"),
+        ("ppo", {"max_grad_norm": float("inf")}, r"hyperparameters.max_grad_norm = inf: expected a number > 0"),
+        ("sac", {"ent_coef": -1}, r"hyperparameters.ent_coef = -1: expected a number >= 0"),
+    ],
+)
+def test_what_an_algorithm_has_not_or_cannot_use_is_refused_by_name(name, changes, said):
+    with pytest.raises(ValueError, match=said):
+        learner_of(name).with_hyperparameters(changes)
+
+
+def test_the_temperature_of_sac_may_find_itself():
+    assert learner_of("sac").with_hyperparameters({"ent_coef": "auto_0.1"}).options(1, 1000)["ent_coef"] == "auto_0.1"
+
+
+def test_a_learning_rate_falls_from_the_one_given_to_nothing():
+    model = SimpleNamespace(learning_rate=4e-4, num_timesteps=25)
+    ppo.lower_learning_rate(model, 100)
+    assert model.lr_schedule(1.0) == pytest.approx(3e-4)
+    model.num_timesteps = 100
+    ppo.lower_learning_rate(model, 100)
+    assert model.lr_schedule(1.0) == 0.0
+
+
+def test_they_are_options_of_a_run(tmp_path):
+    words = ["--runs-dir", str(tmp_path), "--hyperparameters.learning-rate", "3e-4"]
+    config, folder = started([*words, "--hyperparameters", '{"gamma": 0.95}'])
+    assert config.hyperparameters == {"gamma": 0.95, "learning_rate": 3e-4}
+    assert "gamma" in folder.name
+
+
+def test_a_run_says_which_arm_cannot_take_them(tmp_path):
+    with pytest.raises(ValueError, match=r"arm dqn: hyperparameters.clip_range: SinglyDQN takes "):
+        started(["--runs-dir", str(tmp_path), "--arms", "shielded", "dqn", "--hyperparameters.clip-range", "0.1"])
