@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 from places import ROOT
+from stable_baselines3 import PPO
 
 from rss_shield.eval.metrics import METRICS, with_outcomes
 from rss_shield.shield.params import RSSParams
@@ -108,6 +109,13 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--config.action.type ContinuousAction", "config.action = {'type': 'ContinuousAction'}: not possible in"),
         ("--config.duration.seconds 3", "--config.duration.seconds: config.duration = 30 has no keys of its own"),
         ("--config.lanes-count", "--config.lanes-count: expected a key and a value"),
+        ("--hyperparameters.gamma", "--hyperparameters.gamma: expected a key and a value, as in --hyperparameters"),
+        ("--hyperparameters.gamma 2", "arm unshielded: hyperparameters.gamma = 2: expected a number >= 0 and <= 1"),
+        ("--hyperparameters.gama 0.9", "arm unshielded: hyperparameters.gama: PPO takes batch_size, "),
+        (
+            "--arms shielded dqn --hyperparameters.clip-range 0.1",
+            "arm dqn: hyperparameters.clip_range: SinglyDQN takes batch_size, ",
+        ),
         ("--config nowhere.json", "--config: nowhere.json: no such file or directory"),
         ("--config [1]", "--config: [1]: expected a file .json, .toml, .yaml or .yml, or JSON itself"),
     ],
@@ -329,7 +337,8 @@ def test_a_run_with_a_configuration_trains_tests_and_replays_with_it(tmp_path):
         "4",
         "--config.observation.vehicles-count=9",
     ]
-    process = start(tmp_path, *options, "--name", "wide", "--intervention-penalty", "0.25")
+    learners = ["--hyperparameters", '{"gamma": 0.8}', "--hyperparameters.learning-rate", "3e-4"]
+    process = start(tmp_path, *options, *learners, "--name", "wide", "--intervention-penalty", "0.25")
     output, _ = process.communicate(timeout=300)
     assert process.returncode == 0, output
     assert "4 of 4 test episodes agree" in " ".join(output.split())
@@ -342,6 +351,8 @@ def test_a_run_with_a_configuration_trains_tests_and_replays_with_it(tmp_path):
         "observation": {"type": "Kinematics", "vehicles_count": 9},
     }
     assert [config["environment"][key] for key in ("lanes_count", "duration", "policy_frequency")] == [4, 6, 1]
+    model = PPO.load(folder / "shielded-seed0" / "model.zip")
+    assert (model.gamma, model.learning_rate) == (config["ppo"]["gamma"], config["ppo"]["learning_rate"]) == (0.8, 3e-4)
     assert pd.read_csv(folder / "episodes.csv")["length"].max() == 6
     assert pd.read_csv(folder / "unshielded-seed0" / "learning_curve.csv")["length"].max() <= 6
     title = (folder / "table.md").read_text().splitlines()[0]

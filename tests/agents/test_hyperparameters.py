@@ -6,7 +6,6 @@ import pytest
 
 from rss_shield.agents import ppo
 from rss_shield.agents.learner import learner_of
-from rss_shield.train import started
 
 
 def test_changed_arguments_reach_the_algorithm_and_the_record_and_the_rest_stays():
@@ -53,15 +52,3 @@ def test_a_learning_rate_falls_from_the_one_given_to_nothing():
     model.num_timesteps = 100
     ppo.lower_learning_rate(model, 100)
     assert model.lr_schedule(1.0) == 0.0
-
-
-def test_they_are_options_of_a_run(tmp_path):
-    words = ["--runs-dir", str(tmp_path), "--hyperparameters.learning-rate", "3e-4"]
-    config, folder = started([*words, "--hyperparameters", '{"gamma": 0.95}'])
-    assert config.hyperparameters == {"gamma": 0.95, "learning_rate": 3e-4}
-    assert "gamma" in folder.name
-
-
-def test_a_run_says_which_arm_cannot_take_them(tmp_path):
-    with pytest.raises(ValueError, match=r"arm dqn: hyperparameters.clip_range: SinglyDQN takes "):
-        started(["--runs-dir", str(tmp_path), "--arms", "shielded", "dqn", "--hyperparameters.clip-range", "0.1"])
