@@ -96,7 +96,7 @@ def test_a_card_says_on_which_road(model, tmp_path, capsys):
     folder = tmp_path / "runs" / "tested" / "of-a-run-model-merge-v0"
     told = json.loads((folder / "config.json").read_text())["config"]
     assert told["env_id"] == "merge-v0"
-    assert told["parameters"]["ego"] == rss_shield.PRESETS["slides"].ego._asdict()
+    assert told["parameters"]["ego"]["response_time"] == rss_shield.PRESETS["slides"].ego.response_time
     assert set(pd.read_csv(folder / "episodes.csv")["train"]) == {"shielded"}
 
 
