@@ -20,7 +20,8 @@ help:            ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
 	@echo
 	@echo "  PYTHON=$(PYTHON) makes the environment; ARGS='--total-timesteps 1000000' goes to train.py;"
-	@echo "  ENVS='highway-fast-v0 intersection-v0' are the environments of compare."
+	@echo "  ENVS='highway-fast-v0 intersection-v0' are the environments of compare;"
+	@echo "  PLAN=short or full is how much of the campaign paper runs, DIVIDE=1000 tries all of it in minutes."
 
 compare: $(ENVS:%=compare-%)  ## train and compare shielded with unshielded PPO (minutes)
 
@@ -49,16 +50,11 @@ bench: $(VENV)/installed-dev  ## run the benchmarks
 evidence: $(VENV)/installed  ## play scripted policies under the shield and count who is to blame (hours)
 	$(BIN)/python bench/evidence.py $(ARGS)
 
-# one after the other; what has been run is not run again
-SWEEPS := ablation rules presets response-times
-paper: $(VENV)/installed-dev  ## run every experiment of the results pages and write them (hours)
-	@echo "An estimate for 2 cores: ten minutes per training, a quarter of an hour per sweep, two hours in all."; date
-	$(foreach name,$(SWEEPS),$(BIN)/rss-shield sweep experiments/$(name).yaml --workers 2 &&) true
-	$(BIN)/python bench/ablation.py --write $(ARGS)
-	$(foreach env,$(ENVS),$(BIN)/python train.py --env-id $(env) $(BUDGET_$(env)) --name $(env) --resume &&) true
-	$(BIN)/python -m rss_shield.eval.pages $(ENVS:%=runs/%)
-	$(BIN)/rss-shield report $(ENVS:%=runs/%) $(SWEEPS:%=runs/%) --out runs/report
-	@date
+# one after the other; what has been run is not run again, so a stopped one goes on. Try the whole chain: DIVIDE=1000
+PLAN   ?= short
+DIVIDE ?= 1
+paper: $(VENV)/installed-dev  ## run every experiment of the results pages, write them and a report (hours)
+	$(BIN)/python bench/paper.py --plan $(PLAN) --divide $(DIVIDE) $(ARGS)
 
 campaign: $(VENV)/installed  ## train every arm on two roads with many seeds, or go on with it (hours)
 	$(BIN)/python bench/campaign.py $(ARGS)

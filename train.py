@@ -13,7 +13,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from rss_shield.agents.blocks import available_devices, train_in_blocks
 from rss_shield.agents.learner import Learner, learner_of
 from rss_shield.agents.load import load_policy, policy_of
 from rss_shield.agents.trackers import TRACKERS, check_tracker
-from rss_shield.command_line import ConfigFile, fail, parsed, shown
+from rss_shield.command_line import NO_OVERRIDES, ConfigFile, Overrides, fail, parsed, shown
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.envs.fast.config import Unsupported
@@ -36,14 +36,17 @@ from rss_shield.envs.highway.idm_ego import make_idm_vec
 from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, default_preset, scheme_of
 from rss_shield.eval import drivers, removal
-from rss_shield.eval.arms import ARMS, FROM_OPTIONS, SHIELDED, Arm, arm_named, table
+from rss_shield.eval.arms import FROM_OPTIONS, SHIELDED, Arm, arm_named, table
 from rss_shield.eval.config_option import HYPERPARAMETERS, Keys, split_arguments, with_values
 from rss_shield.eval.jobs import Job, run_jobs
+from rss_shield.eval.own import digests, driver_named, function_named, is_own
 from rss_shield.eval.replay import chosen, replay
 from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import changes, open_run, recorded
 from rss_shield.eval.suite import showcase
+from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
+from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.params import PRESETS, Preset, Rules, with_parameters
@@ -78,6 +81,8 @@ examples:
       one arm, which pays for what the shield must correct
   python train.py --arms lazy idm shielded adaptive-penalty --target-intervention 0.5
       drivers that learn nothing beside agents, one of which pays until the shield changes 0.5 m/s^2 on average
+  python train.py --arms shielded my_driver:drive --reward my_reward:reward --preset my-table.yaml
+      your own: a policy, a reward, a table of parameters
   python train.py --list-arms
       all there are
   python train.py --resume --name my-run
@@ -95,22 +100,6 @@ FIRST_REMOVAL_SEED = 2 * 10**9  # likewise of the tests on the way, far from bot
 
 
 @dataclass(frozen=True)
-class Overrides:
-    """None keeps the preset's value."""
-
-    response_time: float | None = None  # rho [s], > 0: delay before the driver must have reacted
-    a_max_accel: float | None = None  # [m/s^2], >= 0: strongest forward acceleration
-    a_min_brake: float | None = None  # [m/s^2], > 0: weakest braking that may be relied on
-    a_max_brake: float | None = None  # [m/s^2], >= a_min_brake: hardest braking of a leader
-    a_min_brake_correct: float | None = None  # [m/s^2], > 0, <= a_min_brake: in one's own lane
-    a_lat_max_accel: float | None = None  # [m/s^2], >= 0: strongest lateral acceleration
-    a_lat_min_brake: float | None = None  # [m/s^2], > 0: weakest lateral braking
-    mu: float | None = None  # [m], >= 0: width of the lateral wobble
-    standstill_gap: float | None = None  # lambda [m], >= 0: gap left when both stand
-    v_cap: float | None = None  # [m/s], > 0: speed above which nobody accelerates
-
-
-@dataclass(frozen=True)
 class Config:
     """What `python train.py --help` shows; one option a field."""
 
@@ -123,7 +112,7 @@ class Config:
     """What simulates: fast (the compiled engine, with the same trajectories) or highway-env (the original)."""
     arms: tuple[str, ...] = ("unshielded", "shielded")
     """What to compare, e.g. unshielded (PPO, the shield only watches), shielded (PPO, it overrides), lazy, idm,
-    penalty-0.5, adaptive-penalty; --list-arms shows all."""
+    penalty-0.5, adaptive-penalty; --list-arms shows all. A policy of your own is an arm as module:function."""
     list_arms: bool = False
     """Show the table of arms and stop."""
     total_timesteps: int = 200_000
@@ -132,10 +121,10 @@ class Config:
     """Training seeds; each trains every arm once."""
     preset: str = "auto"
     """RSS parameters by name: simulator, intersection, slides, ad-rss, carla, rodionova-conservative,
-    rodionova-assertive; auto: intersection at intersections, simulator elsewhere."""
-    ego: Overrides = Overrides()
+    rodionova-assertive; auto: intersection at intersections, simulator elsewhere; or a file of your own."""
+    ego: Overrides = NO_OVERRIDES
     """RSS parameters of the ego that replace the preset's."""
-    other: Overrides = Overrides()
+    other: Overrides = NO_OVERRIDES
     """RSS parameters assumed of everybody else that replace the preset's."""
     entry: str = "cautious"
     """Whom the ego expects to give way where roads cross: cautious (nobody), priority (who must and still
@@ -161,6 +150,8 @@ class Config:
     """When it replaces the agent's action: see `ShieldWrapper`."""
     risk: bool = False
     """Measure the driving safety field, too."""
+    reward: str = ""
+    """A function of your own, module:function, that agents are paid by in training; tests show its return, too."""
     intervention_penalty: float = 0.0
     """Taken off the training reward when the shield overrides; >= 0. Testing uses the raw reward. Arms with a
     penalty of their own, as penalty-0.5, keep theirs."""
@@ -219,18 +210,19 @@ def main(arguments: list[str]) -> None:
     for warning in warnings:
         print(f"train.py: warning: {warning}", file=sys.stderr)
 
-    models = [(arm, seed) for seed in config.seeds for arm in config.arms if not ARMS[arm].scripted]
-    cells = [cell for seed in config.seeds for arm in config.arms for cell in cells_of(config, ARMS[arm], seed)]
+    models = [(arm, seed) for seed in config.seeds for arm in config.arms if not arm_named(arm).scripted]
+    cells = [cell for seed in config.seeds for arm in config.arms for cell in cells_of(config, arm_named(arm), seed)]
     untrained = [model for model in models if not model_path(folder, *model).exists()]
     run_jobs([training(config, preset, folder, *model) for model in untrained], config.workers)
     untested = [cell for cell in cells if not cell_path(folder, *cell).exists()]
     run_jobs([testing(config, preset, folder, *cell) for cell in untested], config.workers)
     if config.backend == "fast" and config.replay_episodes:
-        played = [cell for cell in cells if in_engine(ARMS[cell[0]])]
+        played = [cell for cell in cells if in_engine(arm_named(cell[0]))]
         unchecked = [cell for cell in played if not replay_path(folder, *cell).exists()]
         run_jobs([replaying(config, preset, folder, *cell) for cell in unchecked], config.workers)
     if config.pages:
-        run_jobs([showing(config, preset, folder, arm) for arm in config.arms if in_engine(ARMS[arm])], config.workers)
+        filmed = [arm for arm in config.arms if in_engine(arm_named(arm))]
+        run_jobs([showing(config, preset, folder, arm) for arm in filmed], config.workers)
 
     write_report(folder)
     print(f"\nEverything is in {folder}: table.md, results.json, learning_curve.png, blame.png, ...")
@@ -349,13 +341,14 @@ def _works(config: Config, preset: Preset) -> bool:
 
 
 def _tried(config: Config, preset: Preset) -> gym.Env:
-    envs = [_tried_arm(config, preset, ARMS[name]) for name in _unlike(config.arms)]
+    envs = [_tried_arm(config, preset, arm_named(name)) for name in _unlike(config.arms)]
     return envs[0]
 
 
 def _unlike(names: Sequence[str]) -> list[str]:
     """One arm of each kind of environment."""
-    kinds = {name: shown(sorted({**ARMS[name].config, **ARMS[name].chooses}.items())) for name in reversed(names)}
+    arms = {name: arm_named(name) for name in reversed(names)}
+    kinds = {name: shown(sorted({**arm.config, **arm.chooses}.items())) for name, arm in arms.items()}
     return list({kind: name for name, kind in kinds.items()}.values())[::-1]
 
 
@@ -417,7 +410,7 @@ def model_path(folder: Path, arm: str, seed: int) -> Path:
 
 
 def training(config: Config, preset: Preset, folder: Path, arm: str, seed: int) -> Job:
-    total = learner(config, ARMS[arm]).rounded(config.n_envs, config.total_timesteps)
+    total = learner(config, arm_named(arm)).rounded(config.n_envs, config.total_timesteps)
     return Job(f"train {arm}, seed {seed}", total, "step", functools.partial(_train, config, preset, folder, arm, seed))
 
 
@@ -434,7 +427,7 @@ def replaying(config: Config, preset: Preset, folder: Path, arm: str, seed: int,
 
 def showing(config: Config, preset: Preset, folder: Path, arm: str) -> Job:
     work = functools.partial(_show, config, preset, folder, arm)
-    return Job(f"show {arm}", showcase.shown(tuple(ARMS[arm].tests)), "episode", work)
+    return Job(f"show {arm}", showcase.shown(tuple(arm_named(arm).tests)), "episode", work)
 
 
 def learner(config: Config, arm: Arm) -> Learner:
@@ -448,7 +441,7 @@ def learner(config: Config, arm: Arm) -> Learner:
 
 
 def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, progress: Progress) -> None:
-    row = ARMS[arm]
+    row = arm_named(arm)
     paid = {"intervention_penalty": config.intervention_penalty, "penalty_on": config.penalty_on}
     chosen = learner(config, row)
     total = chosen.rounded(config.n_envs, config.total_timesteps)
@@ -462,6 +455,7 @@ def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, pr
         n_envs=config.n_envs,
         device=config.device,
         progress=progress,
+        reward=function_named(config.reward) if config.reward else None,
         tracker=config.tracker,
         watch=functools.partial(_remove, config, preset, row, total, path),
     )
@@ -487,7 +481,7 @@ def _remove(config: Config, preset: Preset, arm: Arm, total: int, path: Path, mo
 
 
 def _test(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:
-    row = ARMS[arm]
+    row = arm_named(arm)
     policy = driver(config, preset, row, seed) if row.scripted else load_policy(model_path(folder, arm, seed))
     count = config.eval_episodes
     episodes = _played(config, preset, row, row.tests[test], policy, FIRST_TEST_SEED, count, progress)
@@ -504,19 +498,23 @@ def _played(
     count: int,
     progress: Progress = lambda episodes: None,
 ) -> pd.DataFrame:
+    make: Callable[[int], Any] = functools.partial(test_batch, config, preset, arm, shield)
     return evaluate(
-        functools.partial(test_batch, config, preset, arm, shield),
+        scored(make, config.reward),
         policy,
         range(first, first + count),
         n_envs=TEST_ENVS[arm.backend or config.backend],
         keep_actions=in_engine(arm),
         masked=arm.masked and shield["shield"] == "override",
         progress=progress,
+        more=columns_of,
     )
 
 
 def driver(config: Config, preset: Preset, arm: Arm, seed: int) -> drivers.Driver:
     """The policy of an arm that learns nothing."""
+    if arm.own:
+        return driver_named(arm.name)
     env: Any = original(config, preset, arm, SHIELDED)()
     env.close()
     numbers = env.unwrapped.action_type.actions_indexes
@@ -531,13 +529,14 @@ def driver(config: Config, preset: Preset, arm: Arm, seed: int) -> drivers.Drive
 
 
 def _replay(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:
+    row = arm_named(arm)
     sample = chosen(read_cell(cell_path(folder, arm, seed, test)), config.replay_episodes, seed)
-    replays = replay(original(config, preset, ARMS[arm], ARMS[arm].tests[test]), sample, progress)
+    replays = replay(original(config, preset, row, row.tests[test]), sample, progress)
     write_cell(replay_path(folder, arm, seed, test), replays, arm, seed, test)
 
 
 def _show(config: Config, preset: Preset, folder: Path, arm: str, progress: Progress) -> None:
-    row, seed = ARMS[arm], config.seeds[0]
+    row, seed = arm_named(arm), config.seeds[0]
     tests = {test: read_cell(cell_path(folder, arm, seed, test)) for test in row.tests}
     making = {test: original(config, preset, row, shield) for test, shield in row.tests.items()}
     showcase.show(tests, making.__getitem__, folder, arm, f"{row.label}, {config.env_id}", progress)
@@ -557,18 +556,22 @@ def check(config: Config) -> None:
         Options(**wrapped(config))
     except ValueError as error:
         fail(PROGRAM, str(error))
-    presets, devices = ["auto", *PRESETS], available_devices()
-    for arm in config.arms:
+    devices = available_devices()
+    looked_up: list[tuple[str, Callable[[str], Any], str]] = [("--arms", arm_named, arm) for arm in config.arms]
+    looked_up += [("--arms", function_named, arm) for arm in config.arms if is_own(arm)]
+    looked_up += [("--reward", function_named, config.reward)] * bool(config.reward)
+    looked_up += [("--preset", preset_in, config.preset)] * is_file(config.preset)
+    for option, look_up, name in looked_up:
         try:
-            arm_named(arm)
+            look_up(name)
         except ValueError as error:
-            fail(PROGRAM, f"--arms: {error}")
+            fail(PROGRAM, f"{option}: {error}")
     for option, good, expected in (
         ("backend", config.backend in BACKENDS, f"one of {', '.join(BACKENDS)}"),
-        ("arms", is_set_of(config.arms, list(ARMS)), "one or more different names"),
+        ("arms", is_set_of(config.arms, config.arms), "one or more different names"),
+        ("preset", is_file(config.preset) or config.preset in ("auto", *PRESETS), f"one of auto, {KNOWN_PRESETS}"),
         ("total_timesteps", config.total_timesteps >= 1, "at least 1"),
         ("seeds", is_set_of(config.seeds, range(2**32)), "different whole numbers, 0 to 2**32 - 1"),
-        ("preset", config.preset in presets, f"one of {', '.join(presets)}"),
         ("entry", config.entry in ENTRIES, f"one of {', '.join(ENTRIES)}"),
         ("intent", config.intent in INTENTS, f"one of {', '.join(INTENTS)}"),
         ("waiting", config.waiting in WAITING, f"one of {', '.join(WAITING)}"),
@@ -609,9 +612,8 @@ def preset_name(config: Config) -> str:
 
 def resolve(config: Config) -> Preset:
     """The preset with the parameters given on the command line put in."""
-    preset = PRESETS[preset_name(config)]
     try:
-        return with_parameters(preset, _given(config.ego), _given(config.other))
+        return with_parameters(preset_in(preset_name(config)), config.ego.given, config.other.given)
     except ValueError as error:
         raise ValueError(f"--{error}") from None
 
@@ -620,12 +622,13 @@ def options_of(config: Config) -> dict[str, Any]:
     """Every option but those that only say where and how to start."""
     options = {f.name: getattr(config, f.name) for f in fields(config) if f.name not in _NOT_RECORDED}
     rules = {name: value for name, value, _ in changes(config.rules._asdict(), Rules()._asdict())}
-    return {**options, "ego": _given(config.ego), "other": _given(config.other), "rules": rules}
+    return {**options, "ego": config.ego.given, "other": config.other.given, "rules": rules}
 
 
 def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
     """All that the result depends on."""
     parameters = {"ego": preset.ego._asdict(), "other": preset.other._asdict()}
+    own = digests([*config.arms, config.reward, config.preset])  # what is changed later is another run
     return {
         **options_of(config),
         "parameters": {
@@ -643,6 +646,7 @@ def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
             for arm in map(arm_named, config.arms)
             if not arm.scripted
         },
+        **({"sources": own} if own else {}),
         "test_seeds": {"first": FIRST_TEST_SEED, "last": FIRST_TEST_SEED + config.eval_episodes - 1},
     }
 
@@ -665,10 +669,6 @@ def valid_name(text: str) -> str:
 
 
 _NOT_RECORDED = ("list_arms", "workers", "tracker", "name", "runs_dir", "resume", "overwrite")
-
-
-def _given(overrides: Overrides) -> dict[str, float]:
-    return {name: value for name, value in asdict(overrides).items() if value is not None}
 
 
 def run(arguments: list[str]) -> None:

@@ -23,6 +23,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from rss_shield.agents.curve import CurveRecorder, truncate_curve
 from rss_shield.agents.learner import Learner
+from rss_shield.agents.own_reward import Reward
 from rss_shield.agents.trackers import logger_of
 
 Watch = Callable[[BaseAlgorithm], None]
@@ -39,6 +40,7 @@ def train_in_blocks(
     device: str = "cpu",
     progress: Callable[[int], None] = lambda timesteps: None,
     watch: Watch = lambda model: None,
+    reward: Reward | None = None,
     tracker: str = "tensorboard",
 ) -> Path:
     """Train, or go on where an earlier call in the same folder was stopped.
@@ -55,6 +57,7 @@ def train_in_blocks(
       tracker: what else gets the numbers that TensorBoard gets, see `agents.trackers`.
       watch: called with the model before it is saved after a block, for tests on the way. It may draw random
         numbers: the next block seeds every generator anew.
+      reward: what the agent is paid by, see `agents.own_reward`; None = the environment's reward.
 
     Returns:
       Path of the trained model. Nothing is trained when it exists already.
@@ -68,6 +71,7 @@ def train_in_blocks(
     folder.mkdir(parents=True, exist_ok=True)
     block_steps = learner.rollouts_per_block(n_envs) * learner.rollout(n_envs, total_timesteps)
     env = learner.adapt(make_vec(n_envs))
+    env.reward = reward
     try:
         model = _loaded(learner, checkpoint, env, device) or _new(learner, folder, env, seed, device, total_timesteps)
         truncate_curve(curve, model.num_timesteps)

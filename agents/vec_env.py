@@ -6,6 +6,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from stable_baselines3.common.vec_env import VecEnv
 
+from rss_shield.agents.own_reward import Reward, rewards_by, told_by
+
 MASKS = "action_masks"  # the one method that answers for all environments at once
 
 
@@ -30,6 +32,10 @@ class VectorEnvAdapter(VecEnv):
     Args:
       env: a vector environment with autoreset in the same step.
       charge: taken off the rewards; None = nothing.
+
+    Attributes:
+      reward: takes the place of the environment's rewards, before anything is charged; None = they stay. An episode's
+        return is then the sum of these.
     """
 
     autoreset_mode = AutoresetMode.SAME_STEP
@@ -40,6 +46,7 @@ class VectorEnvAdapter(VecEnv):
             raise ValueError(f"autoreset_mode = {mode}: expected {self.autoreset_mode}")
         self.env = env
         self.charge = charge
+        self.reward: Reward | None = None
         self.last_infos: dict = {}
         self.ended = np.zeros(env.num_envs, bool)  # by the last step
         self.truncated = np.zeros(env.num_envs, bool)
@@ -50,6 +57,7 @@ class VectorEnvAdapter(VecEnv):
         observations, self.last_infos = self.env.reset(seed=self._seed)
         self._seed = None
         self.ended, self.truncated = np.zeros((2, self.num_envs), bool)
+        self._sums = np.zeros(self.num_envs)  # of rewards of one's own
         if self.charge is not None:
             self.charge.begin()
         self.reset_infos = [{} for _ in range(self.num_envs)]
@@ -67,12 +75,18 @@ class VectorEnvAdapter(VecEnv):
         observations, rewards, terminated, truncated, infos = self.env.step(self._actions)
         self.last_infos = infos
         self.ended, self.truncated = terminated | truncated, truncated & ~terminated
+        if self.reward is not None:
+            rewards = rewards_by(self.reward, rewards, self._actions, infos, self.ended)
+            self._sums += rewards
         nothing: dict = {}
         list_of_infos = [nothing] * self.num_envs
         for e in np.flatnonzero(self.ended).tolist():
             info = one(infos["final_info"], e)
             info["terminal_observation"] = infos["final_obs"][e]
             info["TimeLimit.truncated"] = bool(self.truncated[e])
+            if self.reward is not None:
+                info["episode"] = {**info["episode"], "r": self._sums[e]}
+                self._sums[e] = 0.0
             list_of_infos[e] = info
         return observations, self._charged(rewards), self.ended, list_of_infos
 
@@ -88,13 +102,7 @@ class VectorEnvAdapter(VecEnv):
         Returns:
           `[E]`; where an episode ended, of its last decision and not of the episode that began.
         """
-        if not self.ended.any():
-            return _under(self.last_infos, keys)
-        finals = _under(self.last_infos["final_info"], keys)
-        if self.ended.all():  # some keys are there only where a decision was made
-            return finals
-        values = _under(self.last_infos, keys)
-        return np.where(self.ended.reshape(-1, *[1] * (np.ndim(values) - 1)), finals, values)
+        return told_by(self.last_infos, self.ended)(*keys)
 
     def close(self) -> None:
         self.env.close()
@@ -127,12 +135,6 @@ def action_masks(env: Any) -> np.ndarray:
     """`action_masks()` of all environments, `[E, A]`: of the engine at once, of others one after the other."""
     together = getattr(env, MASKS, None)
     return np.stack(env.call(MASKS)) if together is None else together()
-
-
-def _under(infos: Any, keys: tuple[str, ...]) -> Any:
-    for key in keys:
-        infos = infos[key]
-    return infos
 
 
 def one(infos: dict, e: int) -> dict:

@@ -3,14 +3,14 @@
     python bench/ablation.py --write                  plays the adversaries, reads runs/ of the sweeps, writes the page
     python bench/ablation.py --episodes 100000
 
-The adversaries are those of tests/adversary.py, who use every right that RSS leaves them. The hostile drivers, rules,
-presets and response times are sweeps: run `rss-shield sweep experiments/NAME.yaml` for ablation, rules, presets and
-response-times first; what has not been run is left out of the page.
+The adversaries are those of tests/adversary.py, who use every right that RSS leaves them. The hostile drivers and the
+rules are sweeps: run `rss-shield sweep experiments/NAME.yaml` for ablation and rules first; what has not been run is
+left out of the page.
 """
 
 import argparse
-import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,8 @@ from test_mutations import FAST, MUTATIONS, SLOW  # noqa: E402
 
 from rss_shield.eval.metrics import with_outcomes  # noqa: E402
 from rss_shield.eval.pages import markdown, spaced, write_page  # noqa: E402
+from rss_shield.eval.provenance import provenance, records_of  # noqa: E402
+from rss_shield.eval.run_folder import versions  # noqa: E402
 from rss_shield.eval.runs.experiment import read_experiment  # noqa: E402
 from rss_shield.eval.runs.points import with_front  # noqa: E402
 from rss_shield.eval.runs.store import Store  # noqa: E402
@@ -40,11 +42,7 @@ HEADER = """# What each rule buys, and what it costs
 
 Written by `python bench/ablation.py --write`. Each row is the whole shield but for one piece. [low, high]: 95 %
 intervals over episodes; rates Clopper-Pearson, means bootstrap."""
-SWEEPS = {
-    "rules": "Each rule, in stock traffic. Blame is by the rules in force, so look at crashes.",
-    "presets": "Published tables of parameters. Blame is by the table in force, so look at crashes.",
-    "response-times": "Response times of the ego, judged by one table with the quickest response.",
-}
+SWEEPS = {"rules": "Each rule, in stock traffic. Blame is by the rules in force, so look at crashes."}
 
 
 def adversaries(episodes: int) -> str:
@@ -71,8 +69,11 @@ def adversaries(episodes: int) -> str:
 
 def hostile(folder: Path) -> str | None:
     """The sweep of hostile drivers: what a rule buys among all of them, and what it costs in stock traffic."""
+    records, store = records_of([folder]), Store(folder / "tasks")
+    if not records:
+        return None
     experiment = read_experiment(ROOT / "experiments" / "ablation.yaml")
-    store = Store(folder / "tasks")
+    experiment = replace(experiment, tests=records[0]["experiment"]["tests"])  # it may have been tried with few
     found = [task for task in tasks_of(experiment) if store.has(task)]
     if not found:
         return None
@@ -117,33 +118,31 @@ def swept(folder: Path, safety: str, performance: str) -> str:
     table = with_front(wide(points, axes), safety, performance)
     count = int(points["n"].max())
     text = markdown_of(texts(table, axes, shown_metrics(table, safety, performance)))
-    return f"{count} episodes a row; ★: on the Pareto front of its environment and policy. {code_of(folder)}\n\n{text}"
-
-
-def code_of(folder: Path) -> str:
-    """By which code a sweep was begun."""
-    record = json.loads((folder / "experiment.json").read_text(encoding="utf-8"))["versions"]
-    return f"Begun with code {str(record['git_commit'])[:12]}, numpy {record['packages']['numpy']}, {record['cpu']}."
+    said = provenance(records_of([folder]))
+    return f"{count} episodes a row; ★: on the Pareto front of its environment and policy.\n\n{text}\n\n{said}"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--episodes", type=int, default=2000, help="of the adversaries, per row")
     parser.add_argument("--runs", type=Path, default=ROOT / "runs", help="folder of the sweeps")
-    parser.add_argument("--write", action="store_true", help=f"write {PAGE.relative_to(ROOT)}")
+    parser.add_argument("--write", action="store_true", help=f"write {PAGE.name} into --out")
+    parser.add_argument("--out", type=Path, default=PAGE.parent, help="folder of the page (default: %(default)s)")
     arguments = parser.parse_args()
     parts = [HEADER, "## Against adversaries who use every right", ADVERSARIES, adversaries(arguments.episodes)]
+    parts += [f"{provenance([versions()])} Seed 1."]
     table = hostile(arguments.runs / "ablation")
     if table:
-        parts += ["## Among hostile drivers on highway-env", f"{HOSTILE} {code_of(arguments.runs / 'ablation')}", table]
+        parts += ["## Among hostile drivers on highway-env", HOSTILE, table]
+        parts += [provenance(records_of([arguments.runs / "ablation"]))]
     for name, text in SWEEPS.items():
         if (arguments.runs / name / "points.csv").exists():
             experiment = read_experiment(ROOT / "experiments" / f"{name}.yaml")
             parts += [f"## `experiments/{name}.yaml`", text]
             parts += [swept(arguments.runs / name, experiment.safety, experiment.performance)]
     if arguments.write:
-        write_page(PAGE, parts)
-        print(f"written: {PAGE}")
+        write_page(arguments.out / PAGE.name, parts)
+        print(f"written: {arguments.out / PAGE.name}")
     else:
         print("\n\n".join(parts))
 

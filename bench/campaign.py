@@ -115,10 +115,11 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="show the parts and what is done, and stop")
     parser.add_argument("--plan", choices=list(PLANS), default="full", help="how much of it (default: %(default)s)")
     parser.add_argument("--parts", nargs="+", help="only these of the plan")
-    parser.add_argument(
-        "--write", action="store_true", help="write docs/results/agents.md from the parts that are done"
-    )
+    parser.add_argument("--write", action="store_true", help="write agents.md into --out from the parts that are done")
     parser.add_argument("--ship", action="store_true", help="copy the models of the first seed into models/")
+    parser.add_argument(
+        "--out", type=Path, default=ROOT / "docs" / "results", help="folder of the page (default: %(default)s)"
+    )
     parser.add_argument("--runs-dir", type=Path, default=Path("runs"), help="folder of all runs (default: %(default)s)")
     parser.add_argument("--divide", type=int, default=1, help="decisions and episodes by this number, and one seed")
     parser.add_argument("more", nargs="*", metavar="-- OPTION", help="further options of train.py")
@@ -138,7 +139,7 @@ def main() -> None:
     else:
         play(chosen, runs, arguments)
     if arguments.write:
-        print(f"written: {write([folder_of(part, runs) for part in chosen], ROOT / 'docs' / 'results')}")
+        print(f"written: {write([folder_of(part, runs) for part in chosen], arguments.out)}")
     if arguments.ship:
         for part in chosen:
             ship(part, runs, ROOT / "models")

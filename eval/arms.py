@@ -6,6 +6,7 @@ A new arm is one row here, and one short file in `agents/baselines/` if it needs
 """
 
 import difflib
+import zlib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -50,6 +51,16 @@ class Arm(NamedTuple):
     @property
     def called(self) -> str:
         return self.train or self.name
+
+    @property
+    def own(self) -> bool:
+        """A function of the user's, `module:function`."""
+        return ":" in self.name
+
+    @property
+    def file(self) -> str:
+        """Name of its files, as every system takes it."""
+        return self.name.replace(":", "-")
 
     @property
     def continuous(self) -> bool:
@@ -156,16 +167,32 @@ ROWS = (
 ARMS = {arm.name: arm for arm in ROWS}
 
 
+OWN_COLOURS = ("#009988", "#EE3377", "#33BBEE", "#CC3311", "#0077BB", "#AA7744")
+
+
 def arm_named(name: str) -> Arm:
-    """An arm.
+    """An arm of the table, or a policy of one's own: "module:function" of observations `[B, ...]` to actions `[B]`.
 
     Raises:
       ValueError: there is none of this name; the message has the nearest.
     """
+    if ":" in name:
+        colour = OWN_COLOURS[zlib.crc32(name.encode()) % len(OWN_COLOURS)]
+        return Arm(name, f"own policy {name}", colour, SCRIPTED, settings={"driver": name})
     if name not in ARMS:
         nearest = difflib.get_close_matches(name, ARMS, n=1, cutoff=0.0)[0]
-        raise ValueError(f"{name!r} is no arm; the nearest is {nearest}, --list-arms shows all")
+        raise ValueError(
+            f"{name!r} is no arm; the nearest is {nearest}, --list-arms shows all; a policy of your own is "
+            "module:function"
+        )
     return ARMS[name]
+
+
+def arm_called(train: str) -> Arm | None:
+    """The arm that tables call so; None where it is none."""
+    if ":" in train:
+        return arm_named(train)
+    return next((arm for arm in ROWS if arm.called == train), None)
 
 
 def table() -> list[list[str]]:

@@ -17,7 +17,7 @@ from rss_shield.eval.stats import Interval, student, wilson
 from rss_shield.eval.table import rounded
 
 ON_CARD = (
-    *("crash", "at_fault", "other", "inherited", "none", "success", "return", "speed", "length"),
+    *("crash", "at_fault", "other", "inherited", "none", "success", "return", "own_return", "speed", "length"),
     *("override_share", "anticipation_share", "mean_acceleration_change"),
 )
 # of the run's record: what a test of the model has to know, and what else it was trained with
@@ -49,6 +49,7 @@ def card_of(arm: str, seed: int, run: dict[str, Any], episodes: pd.DataFrame) ->
         "config": {**config["config"], **row.config},
         "training": {
             **{name: config[name] for name in TRAINING},
+            **({"reward": config["reward"]} if config.get("reward") else {}),
             "shield": dict(row.training),
             "learner": row.learner,
             "hyperparameters": config.get(row.name if row.settings else row.learner, {}),
@@ -91,6 +92,7 @@ def as_text(card: dict[str, Any]) -> str:
             "",
             f"{card['what']}. Learner `{training['learner']}`, {training['total_timesteps']} decisions, "
             f"{training['n_envs']} environments side by side; shield in training: {training['shield']}; "
+            f"{_paid(training)}"
             f"RSS preset {card['preset']}; entry {card['entry']}, intent {card['intent']}, waiting {card['waiting']}.",
             f"Configuration that differs from the environment's: {card['config'] or 'none'}.",
             "",
@@ -115,6 +117,10 @@ def as_text(card: dict[str, Any]) -> str:
             "",
         ]
     )
+
+
+def _paid(training: dict[str, Any]) -> str:
+    return f"reward {training['reward']}; " if "reward" in training else ""
 
 
 def _heading(metric: Metric) -> str:

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from rss_shield.eval.arms import ARMS, OFF, ON
+from rss_shield.eval.arms import OFF, ON, arm_called
 from rss_shield.eval.plots import STYLE, save, style_of
 
 # (heading, test, metric) across and up
@@ -38,7 +38,7 @@ def points_of(summary: pd.DataFrame) -> pd.DataFrame:
     Args:
       summary: as `eval.metrics.summarise` returns it, of one run or several; of an arm in several runs the last counts.
     """
-    arm_of = {arm.called: arm.name for arm in ARMS.values()}
+    arm_of = {train: arm.name for train in summary["train"].unique() if (arm := arm_called(str(train)))}
     rows = summary.assign(arm=summary["train"].map(arm_of)).dropna(subset=["arm"])
     wanted = {(test, metric) for _, test, metric in (*ACROSS, *UP)}
     chosen = [pair in wanted for pair in zip(rows["test"], rows["metric"], strict=True)]

@@ -36,6 +36,7 @@ METRICS = (
     Metric("success", "success", "%", "rate", 100, 0, (0, 1)),
     Metric("time_to_goal", "time to goal", "s", "mean", 1, 1, (0, math.inf)),
     Metric("return", "return", "", "mean", 1, 1),
+    Metric("own_return", "own return", "", "mean", 1, 1),  # where there is a reward of one's own
     Metric("speed", "speed", "m/s", "mean", 1, 1),
     Metric("length", "length", "steps", "mean", 1, 1, (0, math.inf)),
     Metric("override_share", "overridden", "%", "mean", 100, 0, (0, 1)),

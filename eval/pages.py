@@ -4,8 +4,8 @@
 docs/results/ppo.md; without names, all below runs/.
 """
 
+import argparse
 import json
-import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import pandas as pd
 
 from rss_shield.eval import arms
 from rss_shield.eval.files import write_text
+from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.replay import verdict
 from rss_shield.eval.table import legend, table_frame
 
@@ -77,7 +78,7 @@ def ppo_page(runs: Iterable[Path]) -> list[str]:
         frame = table_frame(summary)
         title, config = (run / "table.md").read_text(encoding="utf-8").splitlines()[0], results["config"]
         parts += [f"## `{config['env_id']}`, {run.name}", f"{title}.", f"```sh\n{command(config)}\n```"]
-        parts += [markdown(_turned(frame)), *_replayed(results["replays"])]
+        parts += [markdown(_turned(frame)), *_replayed(results["replays"]), *_provenance(run)]
         legends.append(legend(summary))
     return [*parts, "## What the rows mean", max(legends, key=len)] if legends else parts
 
@@ -90,9 +91,16 @@ def command(config: dict[str, Any]) -> str:
         words += ["--arms", *config["arms"]]
     if config["parameters"].get("roads_cross"):
         words += ["--intent", config["intent"], "--entry", config["entry"], "--waiting", config["waiting"]]
+    if config.get("reward"):
+        words += ["--reward", config["reward"]]
     if config["intervention_penalty"]:
         words += ["--intervention-penalty", config["intervention_penalty"]]
     return " ".join(map(str, words))
+
+
+def _provenance(run: Path) -> list[str]:
+    records = records_of([run])
+    return [provenance(records)] if records else []
 
 
 def _turned(frame: pd.DataFrame) -> list[list[str]]:
@@ -117,14 +125,20 @@ def arms_block() -> str:
     return markdown([heading, *([f"`{row[0]}`", *row[1:]] for row in rows)])
 
 
-def main(runs: list[Path]) -> None:
-    if runs == [Path("--arms")]:
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", nargs="*", type=Path, help="folders of runs of train.py; none: all below runs/")
+    parser.add_argument("--arms", action="store_true", help=f"put the table of arms on {ARMS_PAGE}, and nothing else")
+    parser.add_argument("--out", type=Path, default=PPO_PAGE.parent, help="folder (default: %(default)s)")
+    arguments = parser.parse_args()
+    if arguments.arms:
         fill(ARMS_PAGE, "arms", arms_block())
         print(f"written: {ARMS_PAGE}")
         return
-    write_page(PPO_PAGE, ppo_page(runs or sorted(Path("runs").iterdir())))
-    print(f"written: {PPO_PAGE}")
+    page = arguments.out / PPO_PAGE.name
+    write_page(page, ppo_page(arguments.runs or sorted(Path("runs").iterdir())))
+    print(f"written: {page}")
 
 
 if __name__ == "__main__":
-    main([Path(name) for name in sys.argv[1:]])
+    main()

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from rss_shield.eval.arms import ARMS
+from rss_shield.eval.arms import ARMS, arm_named
 from rss_shield.eval.files import atomic
 from rss_shield.eval.stats import Interval, completion_weights, weighted_mean, weighted_rate, wilson
 from rss_shield.shield.verdicts import AT_FAULT, BLAMES
@@ -189,8 +189,8 @@ def _line(axes: Axes, points: list[tuple[float, Interval]], label: str, arm: str
 
 def style_of(arm: str) -> dict[str, Any]:
     """Colour and marker of an arm, so that more arms than colours are told apart."""
-    markers = "osD^v<>pPXhd"
-    return {"color": ARMS[arm].colour, "marker": markers[list(ARMS).index(arm) // 2 % len(markers)]}
+    markers, row = "osD^v<>pPXhd", arm_named(arm)
+    return {"color": row.colour, "marker": "*" if row.own else markers[list(ARMS).index(arm) // 2 % len(markers)]}
 
 
 def _whisker(axes: Axes, x: float, interval: Interval) -> None:

@@ -104,7 +104,8 @@ def _given(option: str, values: dict[str, Any]) -> str:
 def _penalty(config: dict[str, Any]) -> str:
     """The training reward of the shielded arm is not that of the other one if there is a penalty."""
     penalty = config["intervention_penalty"]
-    return f"intervention penalty {penalty:g} in training" if penalty else "no intervention penalty"
+    own = f"reward {config['reward']} and " if config.get("reward") else ""
+    return own + (f"intervention penalty {penalty:g} in training" if penalty else "no intervention penalty")
 
 
 def _conduct(config: dict[str, Any]) -> str:
@@ -116,7 +117,7 @@ def _conduct(config: dict[str, Any]) -> str:
 
 def cell_path(folder: Path, arm: str, seed: int, test: str) -> Path:
     """The episodes of one trained model under one test condition."""
-    return folder / "episodes" / f"{arm}-seed{seed}-test-{test}.csv"
+    return folder / "episodes" / f"{arm_named(arm).file}-seed{seed}-test-{test}.csv"
 
 
 def replay_path(folder: Path, arm: str, seed: int, test: str) -> Path:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import platform
 import shutil
 import subprocess
@@ -68,7 +69,7 @@ def open_run(folder: Path, config: dict[str, Any], *, resume: bool, overwrite: b
     return [
         f"{name} was {before.get(name)} when this run was started and is {now[name]} now"
         for name in now
-        if name != "config" and before.get(name) != now[name]
+        if name in before and name != "config" and before[name] != now[name]
     ]
 
 
@@ -105,6 +106,7 @@ def versions() -> dict[str, Any]:
     return {
         "python": platform.python_version(),
         "platform": platform.platform(),
+        "cores": os.cpu_count(),
         "cpu": llvmlite.binding.get_host_cpu_name(),  # what is compiled for it may round the last bit differently
         "packages": {name: _version(name) for name in PACKAGES},
         "git_commit": _git("rev-parse", "HEAD"),

@@ -28,6 +28,7 @@ MOST_DIGITS = 9  # what is closer to a limit is at the limit
 GOAL_LEGEND = (
     " success: % of the n test episodes that reached the goal without a contact; time to goal: mean of those episodes."
 )
+OWN_LEGEND = " own return: of the reward that --reward names; return: of the environment's."
 
 
 def table_frame(summary: pd.DataFrame) -> pd.DataFrame:
@@ -47,7 +48,8 @@ def table_frame(summary: pd.DataFrame) -> pd.DataFrame:
 
 def legend(summary: pd.DataFrame) -> str:
     """What the columns mean."""
-    return LEGEND + GOAL_LEGEND * ("success" in set(summary["metric"]))
+    shown = set(summary["metric"])
+    return LEGEND + GOAL_LEGEND * ("success" in shown) + OWN_LEGEND * ("own_return" in shown)
 
 
 def with_intervals(numbers: np.ndarray, digits: int, limits: tuple[float, ...] = ()) -> str:

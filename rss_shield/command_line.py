@@ -5,6 +5,7 @@ import io
 import json
 import re
 import sys
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any, NoReturn, TypeVar
 
 import tyro
@@ -23,6 +24,30 @@ ConfigFile = Annotated[
         str_from_instance=lambda value: [json.dumps(value)],
     ),
 ]
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """RSS parameters by name; None keeps the preset's value."""
+
+    response_time: float | None = None  # rho [s], > 0: delay before the driver must have reacted
+    a_max_accel: float | None = None  # [m/s^2], >= 0: strongest forward acceleration
+    a_min_brake: float | None = None  # [m/s^2], > 0: weakest braking that may be relied on
+    a_max_brake: float | None = None  # [m/s^2], >= a_min_brake: hardest braking of a leader
+    a_min_brake_correct: float | None = None  # [m/s^2], > 0, <= a_min_brake: in one's own lane
+    a_lat_max_accel: float | None = None  # [m/s^2], >= 0: strongest lateral acceleration
+    a_lat_min_brake: float | None = None  # [m/s^2], > 0: weakest lateral braking
+    mu: float | None = None  # [m], >= 0: width of the lateral wobble
+    standstill_gap: float | None = None  # lambda [m], >= 0: gap left when both stand
+    v_cap: float | None = None  # [m/s], > 0: speed above which nobody accelerates
+
+    @property
+    def given(self) -> dict[str, float]:
+        """Those that replace something."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+
+NO_OVERRIDES = Overrides()
 
 
 def parsed(kind: type[T], prog: str, description: str, arguments: list[str], default: T | None = None) -> T:

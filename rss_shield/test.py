@@ -6,7 +6,6 @@ if __name__ == "__main__":  # before all that takes its time
     stop_on_interrupt("rss-shield test: stopping")
 
 import functools
-import importlib
 import json
 import sys
 from collections.abc import Callable, Mapping
@@ -23,21 +22,24 @@ from rich.console import Console
 
 import rss_shield
 from rss_shield.agents.load import algorithm_in, policy_of
-from rss_shield.command_line import ConfigFile, fail, parsed, shown
+from rss_shield.command_line import NO_OVERRIDES, ConfigFile, Overrides, fail, parsed, shown
 from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.envs.make_vec import BACKENDS
-from rss_shield.envs.options import WAITING
+from rss_shield.envs.options import WAITING, default_preset
 from rss_shield.eval.arms import CONTINUOUS, OFF_AND_ON
 from rss_shield.eval.config_option import split_arguments, with_values
 from rss_shield.eval.files import atomic, write_json
 from rss_shield.eval.metrics import summarise
+from rss_shield.eval.own import digests, driver_named, is_own
 from rss_shield.eval.progress import move_to, progress_bar
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import versions
+from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
+from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.eval.table import print_table, write_table
 from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
-from rss_shield.shield.params import PRESETS, Preset, RSSParams
+from rss_shield.shield.params import PRESETS, Preset, RSSParams, with_parameters
 
 PROGRAM = "rss-shield test"
 ENV_ID = "highway-fast-v0"
@@ -58,6 +60,8 @@ examples:
       ... one observation to one action
   rss-shield test model.zip --config.duration 60 --config.lanes-count 4
       on a road that it was not trained on
+  rss-shield test my_driver:drive --preset my-table.yaml --ego.response-time 0.5 --reward my_reward:reward
+      with RSS parameters and a reward of one's own
 """
 Policy = Callable[..., np.ndarray]
 
@@ -81,7 +85,13 @@ class Config:
     backend: str = "fast"
     """What simulates: fast (the compiled engine) or highway-env (the original)."""
     preset: str = "auto"
-    """RSS parameters by name; auto: the card's, else what suits the environment."""
+    """RSS parameters by name, or a file of your own; auto: the card's, else what suits the environment."""
+    ego: Overrides = NO_OVERRIDES
+    """RSS parameters of the ego that replace the preset's."""
+    other: Overrides = NO_OVERRIDES
+    """RSS parameters assumed of everybody else that replace the preset's."""
+    reward: str = ""
+    """A function of your own, module:function: its sums are in the column own return."""
     entry: str = ""
     """Whom the ego expects to give way where roads cross: cautious, priority or assertive."""
     intent: str = ""
@@ -151,7 +161,7 @@ def completed(config: Config, values: dict[tuple[str, ...], Any], card: Mapping[
         ("episodes", config.episodes >= 1, "at least 1"),
         ("first_seed", 0 <= config.first_seed < 2**31, "0 to 2**31 - 1"),
         ("backend", config.backend in BACKENDS, f"one of {', '.join(BACKENDS)}"),
-        ("preset", config.preset in ("auto", *PRESETS), f"one of auto, {', '.join(PRESETS)}"),
+        ("preset", is_file(config.preset) or config.preset in ("auto", *PRESETS), f"one of auto, {KNOWN_PRESETS}"),
         ("entry", config.entry in ENTRIES, f"one of {', '.join(ENTRIES)}"),
         ("intent", config.intent in INTENTS, f"one of {', '.join(INTENTS)}"),
         ("waiting", config.waiting in WAITING, f"one of {', '.join(WAITING)}"),
@@ -171,10 +181,31 @@ def tests_of(config: Config, card: Mapping[str, Any]) -> dict[str, Mapping[str, 
     return {test: known[test] for test in config.tests}
 
 
-def preset_of(config: Config, card: Mapping[str, Any]) -> str | Preset | None:
-    """The table in force: as on the command line, as on the card, or what suits the environment (None)."""
+def preset_of(config: Config, card: Mapping[str, Any]) -> Preset | None:
+    """The table in force: as on the command line, as on the card, or what suits the environment (None).
+
+    Raises:
+      ValueError: names an option out of range.
+    """
+    preset = _preset_of(config, card)
+    if not (config.ego.given or config.other.given):
+        return preset
+    if preset is None:
+        env = rss_shield.make(config.env_id, shield=None)
+        env.close()
+        preset = PRESETS[default_preset(env.unwrapped)]
+    try:
+        return with_parameters(preset, config.ego.given, config.other.given)
+    except ValueError as error:
+        raise ValueError(f"--{error}") from None
+
+
+def _preset_of(config: Config, card: Mapping[str, Any]) -> Preset | None:
     if config.preset != "auto":
-        return config.preset
+        try:
+            return preset_in(config.preset)
+        except ValueError as error:
+            raise ValueError(f"--preset: {error}") from None
     if card.get("env_id") != config.env_id or "parameters" not in card:
         return None
     told = card["parameters"]
@@ -201,8 +232,8 @@ def policy_for(config: Config, card: Mapping[str, Any]) -> tuple[Tested, Config]
     Raises:
       ValueError: there is no such file, module or function.
     """
-    if ":" in config.policy and not Path(config.policy).exists():
-        return Tested(imported(config.policy, config.one_by_one)), config
+    if is_own(config.policy):
+        return Tested(driver_named(config.policy, config.one_by_one)), config
     path = Path(config.policy)
     if not path.exists():
         raise ValueError(f"{path}: no such file; expected a model's .zip file or module:function")
@@ -211,36 +242,6 @@ def policy_for(config: Config, card: Mapping[str, Any]) -> tuple[Tested, Config]
         config = replace(config, config={**config.config, **CONTINUOUS})
     policy = policy_of(model)
     return Tested(policy, (model.observation_space, model.action_space), getattr(policy, "masked", False)), config
-
-
-def imported(name: str, one_by_one: bool) -> Policy:
-    """A function of a module, looked for where we are, too."""
-    module, _, function = name.partition(":")
-    sys.path.insert(0, "")
-    try:
-        found = getattr(importlib.import_module(module), function)
-    except ModuleNotFoundError as error:
-        raise ValueError(f"{name}: no module {error.name!r}") from None
-    except AttributeError:
-        raise ValueError(f"{name}: module {module!r} has no {function!r}") from None
-    finally:
-        sys.path.pop(0)
-    if not callable(found):
-        raise ValueError(f"{name}: {type(found).__name__} cannot be called; expected a function of observations")
-    return functools.partial(_checked, found, name, one_by_one)
-
-
-def _checked(function: Callable[..., Any], name: str, one_by_one: bool, observations: np.ndarray) -> np.ndarray:
-    """Its actions, if there is one for each observation."""
-    if one_by_one:
-        return np.array([function(observation) for observation in observations])
-    actions = np.asarray(function(observations))
-    if actions.ndim == 0 or len(actions) != len(observations):
-        raise ValueError(
-            f"{name}: returned an array of shape {actions.shape} for {len(observations)} observations; expected one "
-            "action for each, or --one-by-one"
-        )
-    return actions
 
 
 def environments(config: Config, params: Any, shield: Mapping[str, Any], n_envs: int) -> VectorEnv:
@@ -286,13 +287,14 @@ def play(
     discrete = not config.config.get("action") or config.config["action"].get("type") != "ContinuousAction"
     with progress_bar(config.episodes, f"shield {test}", "episode") as bar:
         episodes = evaluate(
-            functools.partial(environments, config, params, shield),
+            scored(functools.partial(environments, config, params, shield), config.reward),
             policy.act,
             range(config.first_seed, config.first_seed + config.episodes),
             n_envs=SIDE_BY_SIDE[config.backend],
             keep_actions=discrete,
             masked=policy.masked and shield["shield"] == "override",
             progress=lambda done: move_to(bar, done),
+            more=columns_of,
         )
     return episodes.assign(train=card.get("arm", config.policy), test=test, train_seed=card.get("train_seed", 0))
 
@@ -304,7 +306,10 @@ def report(config: Config, params: Any, episodes: pd.DataFrame) -> None:
     title = f"{config.policy} on {config.env_id}, {config.episodes} episodes"
     with atomic(config.out / "episodes.csv") as temporary:
         episodes.to_csv(temporary, index=False)
-    record = {**vars(config), "out": str(config.out), "parameters": params}
+    sources = digests([config.policy, config.reward, config.preset])
+    table = {"ego": params.ego._asdict(), "other": params.other._asdict(), "source": params.source} if params else None
+    record = {**vars(config), "out": str(config.out), "parameters": table, "sources": sources}
+    record |= {"ego": config.ego.given, "other": config.other.given}
     write_json(config.out / "config.json", {"config": record, **versions()})
     write_table(summary, config.out, title)
     print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160))

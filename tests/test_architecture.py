@@ -69,7 +69,7 @@ MAY_IMPORT = {
     "envs.fast": ROADS | ENTRY | BELOW | {"envs.decisions", "envs.semantic", "shield.risk"},
     "eval.stats": set(),
     "eval.runs": {"eval.stats", "eval.metrics", "eval.plots", "eval.table", "eval.files"}
-    | {"eval.config_option", "eval.interrupt"},
+    | {"eval.config_option", "eval.interrupt", "eval.own"},
     "eval.trace_risk": {"shield.geometry", "shield.lanes", "shield.params", "shield.risk", "shield.trace"},
     "eval.viewer": {"eval.files", "eval.plots", "eval.trace_risk", "shield.geometry", "shield.risk", "shield.trace"},
 }

@@ -39,6 +39,7 @@ SCRIPTS = {
     "torchrl_cost": "cost of 5 random episodes: ",
     "cost_key": "multiplier ",
     "public_settings": "rl-agents DQN: ",
+    "own_comparison": "report/index.html: ",
 }
 LIBRARIES = {"torchrl_cost": "torchrl"}  # that a script needs beyond ours
 

@@ -23,6 +23,7 @@ from rss_shield.eval.metrics import summarise, with_outcomes
 from rss_shield.eval.pages import command, markdown, write_page
 from rss_shield.eval.paper.compared import difference
 from rss_shield.eval.plots import joined_bins
+from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.stats import Interval, clopper_pearson, cluster_bootstrap, weighted_mean
 from rss_shield.shield.verdicts import AT_FAULT
 
@@ -39,7 +40,7 @@ DRAWN = (  # what the frontier is drawn from
 )
 HEADER = """# Arms compared
 
-Written by `python bench/campaign.py --plan short --write` from runs of `train.py`.
+Written by `python bench/campaign.py --write`, with the `--plan` of its runs, from runs of `train.py`.
 
 What the arms are: [arms](../arms.md). *Without* and *with*: tested without the shield and with it, on the same
 episodes. [low, high]: 95 % intervals; of arms with several training seeds over seeds and episodes (hierarchical
@@ -52,6 +53,7 @@ class Road(NamedTuple):
 
     env_id: str
     configs: list[dict[str, Any]]
+    records: list[dict[str, Any]]  # the same, with versions and machine
     episodes: pd.DataFrame  # test episodes; train as in tables
     curves: pd.DataFrame  # training episodes; arm, train_seed
     removals: pd.DataFrame
@@ -90,9 +92,8 @@ def _road(env_id: str, runs: list[Path]) -> Road:
             if path.exists():
                 curves.append(pd.read_csv(path).assign(arm=arm, train_seed=seed))
     episodes = pd.concat([pd.read_csv(run / "episodes.csv") for run in runs], ignore_index=True)
-    return Road(
-        env_id, configs, with_outcomes(episodes), _joined(curves), _joined(removals), _joined(prices), _longer(runs)
-    )
+    trained = _joined(curves), _joined(removals), _joined(prices)
+    return Road(env_id, configs, records_of(runs), with_outcomes(episodes), *trained, _longer(runs))
 
 
 def _longer(runs: list[Path]) -> dict[str, pd.DataFrame]:
@@ -353,6 +354,7 @@ def section_of(road: Road, folder: Path) -> list[str]:
         questions(road, cells),
         *figures_of(road, folder),
         f"```sh\n{commands}\n```",
+        provenance(road.records),
     ]
 
 

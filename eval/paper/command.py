@@ -57,8 +57,10 @@ def footer(runs: tuple[Path, ...]) -> str:
                     f"{package} {version}" for package, version in versions["packages"].items() if version
                 )
                 code = f"{versions['git_commit']}{' with changes' if versions['git_changes'] else ''}"
+                cores = f", {versions['cores']} cores" if "cores" in versions else ""
                 lines += [
-                    f"{run.name}: code {code}; Python {versions['python']}; {versions['platform']}; {versions['cpu']}"
+                    f"{run.name}: code {code}; Python {versions['python']}; {versions['platform']}; "
+                    f"{versions['cpu']}{cores}"
                 ]
                 lines += [f"  {packages}"]
     return "\n".join(lines)

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from rss_shield.eval import removal
-from rss_shield.eval.arms import ARMS
+from rss_shield.eval.arms import arm_called
 from rss_shield.eval.frontier import plot_frontier
 from rss_shield.eval.metrics import summarise, with_outcomes
 from rss_shield.eval.pages import command
@@ -36,7 +36,7 @@ GROUPS = {  # tables of a run: headings of their metrics
         "min time gap",
         "near misses",
     ),
-    "Performance": ("success", "time to goal", "return", "speed", "length", "frozen"),
+    "Performance": ("success", "time to goal", "return", "own return", "speed", "length", "frozen"),
     "Shield and ride": ("overridden", "anticipated", "change", "rms jerk", "hard braking", "comfortable"),
 }
 INTERVALS = "[low, high]: 95 % interval over test episodes of these trained models; (low, high): over training seeds."
@@ -107,8 +107,7 @@ def _figures_of_run(folder: Path, figures: Path, config: dict[str, Any], episode
     if len(removals):
         removal.plot_removal(removals, figures, road)
         yield Figure("The agent on its way through training, with the shield taken away.", figures / "removal.png")
-    called = {arm.called for arm in ARMS.values()}
-    if summary["train"].nunique() > 2 and set(summary["train"]) <= called:
+    if summary["train"].nunique() > 2 and all(map(arm_called, summary["train"].unique())):
         plot_frontier(summary, figures, road)
         yield Figure("Who needs the shield, and what it earns with it and without.", figures / "frontier.png")
     if plot_comfort(summary, figures, road):

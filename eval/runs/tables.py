@@ -16,7 +16,7 @@ from rss_shield.eval.plots import STYLE
 from rss_shield.eval.runs.points import APART, groups_of, metric_named, with_front
 from rss_shield.eval.table import rounded
 
-SHOWN = ("crash", "at_fault", "success", "return", "speed", "override_share", "rms_jerk", "min_ttc")
+SHOWN = ("crash", "at_fault", "success", "return", "own_return", "speed", "override_share", "rms_jerk", "min_ttc")
 FRONT, BEATEN = "#0072B2", "#999999"
 BOUNDS = ("low", "high")
 

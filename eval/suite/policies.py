@@ -1,15 +1,33 @@
 """Scripted policies. What they do depends on the episode's seed alone, so settings are compared on the same actions."""
 
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+
+from rss_shield.eval.own import function_named, is_own
 
 POLICIES = ("random", "faster", "idle", "slower", "lanes", "continuous", "full-throttle")
 _META = {  # number of meta-actions -> where each is
     5: {"LANE_LEFT": 0, "IDLE": 1, "LANE_RIGHT": 2, "FASTER": 3, "SLOWER": 4},
     3: {"SLOWER": 0, "IDLE": 1, "FASTER": 2},  # where nobody changes lanes
 }
+
+
+def check_policy(name: str) -> None:
+    """Is it one of POLICIES, or a function of the user's own, `module:function`?
+
+    Raises:
+      ValueError: neither.
+    """
+    if is_own(name):
+        function_named(name)
+    elif name not in POLICIES:
+        nearest = get_close_matches(name, POLICIES, n=1, cutoff=0.0)[0]
+        raise ValueError(
+            f"policy = {name!r}: the nearest is {nearest!r}; expected one of {', '.join(POLICIES)}, or module:function"
+        )
 
 
 class Scripted:
@@ -25,8 +43,7 @@ class Scripted:
     """
 
     def __init__(self, name: str, space: spaces.Space, seed: int) -> None:
-        if name not in POLICIES:
-            raise ValueError(f"policy = {name!r}: expected one of {', '.join(POLICIES)}")
+        check_policy(name)
         continuous = name in ("continuous", "full-throttle")
         labels = _META.get(int(space.n)) if isinstance(space, spaces.Discrete) else None
         if continuous != isinstance(space, spaces.Box) or (not continuous and labels is None):

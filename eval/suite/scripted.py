@@ -1,5 +1,6 @@
-"""A task without training: a scripted policy on a row of episodes."""
+"""A task without training: a scripted policy, or one of the user's own, on a row of episodes."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -10,9 +11,11 @@ from gymnasium.vector import AutoresetMode
 from rss_shield.envs.fast.measured import columns
 from rss_shield.envs.make import make
 from rss_shield.envs.make_vec import make_vec
+from rss_shield.eval.own import driver_named, is_own
 from rss_shield.eval.rollout import evaluate, run_episode
 from rss_shield.eval.runs.store import Files
 from rss_shield.eval.suite.policies import Scripted
+from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.eval.suite.setup import setup_of
 
 SIDE_BY_SIDE = 256  # episodes in the engine
@@ -33,15 +36,17 @@ def seeds_of(config: dict[str, Any]) -> range:
 def play(environment: str, policy: str, options: dict[str, Any], seeds: range) -> pd.DataFrame:
     """One row per episode; columns as in `eval.rollout.run_episode`."""
     arguments = setup_of(environment, options)
-    backend = arguments.pop("backend")
+    backend, reward = arguments.pop("backend"), arguments.pop("reward", "")
+    own = driver_named(policy) if is_own(policy) else None
     if backend == "highway-env":
         env = make(environment, **arguments)
         space = env.action_space
         env.close()
-        episodes = [
-            run_episode(lambda: make(environment, **arguments), Scripted(policy, space, seed), seed) for seed in seeds
-        ]
-        return pd.DataFrame(episodes)
+
+        def driver(seed: int) -> Callable[[Any], Any]:
+            return Scripted(policy, space, seed) if own is None else lambda seen: own(np.asarray(seen)[None])[0]
+
+        return pd.DataFrame([run_episode(lambda: make(environment, **arguments), driver(seed), seed) for seed in seeds])
 
     measured = arguments.pop("measures", False)
 
@@ -58,15 +63,15 @@ def play(environment: str, policy: str, options: dict[str, Any], seeds: range) -
     frames = []
     for chunk in chunks:
         # as many environments as episodes, so each plays the one of its own policy
-        each = [Scripted(policy, space, seed) for seed in chunk]
+        drivers = own or partial(_act, [Scripted(policy, space, seed) for seed in chunk])
         frames.append(
             evaluate(
-                batch,
-                partial(_act, each),
+                scored(batch, reward),
+                drivers,
                 chunk,
                 n_envs=len(chunk),
                 keep_actions=False,
-                more=columns if measured else lambda env, e: {},
+                more=(lambda env, e: columns(env, e) | columns_of(env, e)) if measured else columns_of,
             )
         )
     return pd.concat(frames, ignore_index=True).drop(columns="actions")

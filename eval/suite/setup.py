@@ -9,8 +9,11 @@ from rss_shield.envs.highway.drivers import RECKLESS
 from rss_shield.envs.highway.hostile import HOSTILE
 from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import MODES, Options
+from rss_shield.eval.config_option import read_config
+from rss_shield.eval.own import function_named
 from rss_shield.eval.runs.names import check_names, nested
-from rss_shield.shield.params import PRESETS, Preset, RSSParams, Rules, with_parameters
+from rss_shield.eval.suite.own_table import preset_in
+from rss_shield.shield.params import Preset, RSSParams, Rules, with_parameters
 
 OTHERS = {"reckless": RECKLESS, **HOSTILE}  # who else is on the road, by name
 _SHIELD = (
@@ -18,19 +21,20 @@ _SHIELD = (
     *("filter", "filter_at", "correction", "evasion", "replace", "intervention_penalty", "penalty_on"),
 )
 _TABLE = ("preset", "ego", "other")
-KNOWN = ("shield", "backend", "others", "config", "rules", "judge", *_TABLE, *_SHIELD)
+KNOWN = ("shield", "backend", "others", "config", "rules", "judge", "reward", *_TABLE, *_SHIELD)
 DEFAULT_PRESET = "simulator"
 
 
 def setup_of(environment: str, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Keyword arguments of `rss_shield.make`, and `shield` and `backend`.
+    """Keyword arguments of `rss_shield.make`, and `shield`, `backend` and, where one is asked for, `reward`.
 
     Args:
       environment: its id.
-      options: dotted names -> values: shield (override, monitor), backend (fast, highway-env), preset,
+      options: dotted names -> values: shield (override, monitor), backend (fast, highway-env), preset (or a file),
         ego.NAME and other.NAME (`RSSParams`), rules.NAME (`Rules`), judge.preset, judge.ego.NAME, judge.other.NAME,
         judge.rules.NAME (one judge for all settings; on highway-env only), the other options of `ShieldWrapper` by
-        their names, others (stock, or who in `OTHERS`), config.NAME (of the environment).
+        their names, others (stock, or who in `OTHERS`), config.NAME (of the environment; or config, a file), reward
+        (module:function; in the engine only).
 
     Raises:
       ValueError: an unknown name, with the nearest known one, or a value out of range.
@@ -57,12 +61,18 @@ def setup_of(environment: str, options: Mapping[str, Any]) -> dict[str, Any]:
         arguments["judge_params"] = _table(environment, judge, "judge.")
         arguments["judge_rules"] = _rules(judge.get("rules", {}), "judge.rules")
     Options.of(arguments)
-    config = dict(given.get("config", {}))
+    config = given.get("config", {})
+    config = read_config(config) if isinstance(config, str) else dict(config)
     if given.get("others", "stock") != "stock":
         config["other_vehicles_type"] = OTHERS[given["others"]]
     if config:
         check_config(environment, config)
         arguments["config"] = config
+    if given.get("reward"):
+        function_named(given["reward"])
+        if backend != "fast":
+            raise ValueError(f"reward = {given['reward']!r}: expected backend: fast, which sums it up")
+        arguments["reward"] = given["reward"]
     return {"shield": given.get("shield", "override"), "backend": backend, **arguments}
 
 
@@ -77,9 +87,10 @@ def _table(environment: str, given: Mapping[str, Any], prefix: str) -> Preset | 
     if "preset" not in given and not any(asked.values()) and not prefix:
         return None
     name = given.get("preset", "intersection" if "intersection" in environment else DEFAULT_PRESET)
-    if name not in PRESETS:
-        raise ValueError(f"{prefix}preset = {name!r}: expected one of {', '.join(PRESETS)}")
-    preset = PRESETS[name]
+    try:
+        preset = preset_in(name)
+    except ValueError as error:
+        raise ValueError(f"{prefix}{error}") from None
     for side, values in asked.items():
         check_names(values, RSSParams._fields, f"{prefix}{side}")
     try:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from rss_shield.envs.highway.recorder import record_trace
+from rss_shield.eval.arms import arm_named
 from rss_shield.eval.replay import playback
 from rss_shield.eval.run_folder import PAGES
 from rss_shield.eval.viewer.filmstrip import write_filmstrip
@@ -59,7 +60,7 @@ def show(
     files: list[Path] = []
     (folder / PAGES).mkdir(parents=True, exist_ok=True)
     for i, (kind, seed) in enumerate(worth_watching(next(iter(tests.values()))).items()):
-        path = folder / PAGES / f"{arm}-{kind}.html"
+        path = folder / PAGES / f"{arm_named(arm).file}-{kind}.html"
         if not path.exists():
             traces = [_traced(make(test), episodes, seed) for test, episodes in tests.items()]
             labels = [f"shield {test}" if test in ("off", "on") else test for test in tests]

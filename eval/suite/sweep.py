@@ -12,7 +12,7 @@ import io
 import json
 import sys
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -28,6 +28,7 @@ from rss_shield.eval.runs.points import metric_named, point_row
 from rss_shield.eval.runs.store import Files, Store
 from rss_shield.eval.runs.tables import write_points
 from rss_shield.eval.runs.tasks import Task, samples_of, tasks_of
+from rss_shield.eval.suite.policies import check_policy
 from rss_shield.eval.suite.scripted import scripted_task
 from rss_shield.eval.suite.setup import setup_of
 
@@ -44,6 +45,8 @@ class Arguments:
     """How many tasks at a time; on a running cluster (--address) as many as it has room for."""
     address: str = ""
     """Of a running Ray cluster; auto: the one this machine is part of; by default one is started here."""
+    episodes: int | None = None
+    """Test episodes of each task, in place of the file's: few of them, to try it."""
     runs_dir: Path = Path("runs")
     """The results are below it, in a folder of the experiment's name."""
 
@@ -167,6 +170,7 @@ def check_tasks(tasks: list[Task]) -> None:
 
             check_trained(task.config)
         else:
+            check_policy(task.config["policy"])
             setup_of(task.config["environment"], task.config["options"])
 
 
@@ -194,13 +198,26 @@ def sweep(experiment: Experiment, folder: Path, work: Work = do_task, **run: Any
     return under_way
 
 
+def with_episodes(experiment: Experiment, episodes: int | None) -> Experiment:
+    """Other numbers of test episodes; None = as in the file.
+
+    Raises:
+      ValueError: out of range.
+    """
+    if episodes is None:
+        return experiment
+    if episodes < 1:
+        raise ValueError(f"--episodes {episodes} is out of range: expected at least 1")
+    return replace(experiment, tests={**experiment.tests, "episodes": episodes})
+
+
 def _record(experiment: Experiment, folder: Path) -> list[str]:
     """Write the experiment and the versions beside its results; says what changed since the first task."""
     path, now = folder / "experiment.json", json.loads(to_json(versions()))
     begun = path.exists() and any((folder / "tasks").glob("[!.]*"))
     before = json.loads(path.read_text(encoding="utf-8")) if begun else {"versions": now}
     write_json(path, {"experiment": asdict(experiment), "versions": before["versions"]})
-    changed = [name for name in now if now[name] != before["versions"].get(name)]
+    changed = [name for name in now if name in before["versions"] and now[name] != before["versions"][name]]
     return [
         f"{name} is not what it was when the first task of {folder} ran: remove the folder to run all anew"
         for name in changed
@@ -211,7 +228,7 @@ def run(arguments: list[str]) -> None:
     """What a command line asks for."""
     given = tyro.cli(Arguments, prog="rss-shield sweep", description=__doc__, args=arguments)
     try:
-        experiment = read_experiment(given.experiment)
+        experiment = with_episodes(read_experiment(given.experiment), given.episodes)
         done = sweep(
             experiment,
             given.runs_dir / experiment.name,

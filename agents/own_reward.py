@@ -1,0 +1,69 @@
+"""A reward of one's own: what it is made of, and how an agent is paid by it."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+Told = Callable[..., np.ndarray]
+
+
+class Decision(NamedTuple):
+    """The last decision of E environments side by side."""
+
+    reward: np.ndarray  # [E] the environment's own
+    actions: np.ndarray  # [E] or [E, A]
+    ended: np.ndarray  # [E] did its episode end with it?
+    told: Told  # told("speed"), told("shield", "override_fraction"): [E] what infos say, also where an episode ended
+
+
+Reward = Callable[[Decision], Any]  # -> [E]
+
+
+def told_by(infos: dict, ended: np.ndarray) -> Told:
+    """What infos say about the last decision of every environment, by keys.
+
+    Args:
+      infos: of a vector environment, with autoreset in the same step or without any.
+      ended: `[E]`.
+    """
+
+    def told(*keys: str) -> np.ndarray:
+        if not ended.any() or "final_info" not in infos:
+            return _under(infos, keys)
+        finals = _under(infos["final_info"], keys)
+        if ended.all():  # some keys are there only where a decision was made
+            return finals
+        values = _under(infos, keys)
+        return np.where(ended.reshape(-1, *[1] * (np.ndim(values) - 1)), finals, values)
+
+    return told
+
+
+def _under(infos: Any, keys: tuple[str, ...]) -> Any:
+    for key in keys:
+        infos = infos[key]
+    return infos
+
+
+def rewards_by(
+    function: Reward, rewards: np.ndarray, actions: np.ndarray, infos: dict, ended: np.ndarray
+) -> np.ndarray:
+    """What one's own reward pays, less what an intervention penalty takes off.
+
+    Args:
+      function: see `Decision`.
+      rewards: `[E]`, of the environment, a penalty taken off.
+
+    Raises:
+      ValueError: the function does not answer with one finite number for each environment.
+    """
+    told = told_by(infos, ended)
+    raw = np.asarray(told("raw_reward"), float)
+    paid = np.asarray(function(Decision(raw, np.asarray(actions), ended, told)), float)
+    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', function)}"
+    if paid.shape != raw.shape:
+        raise ValueError(f"reward {name}: shape {paid.shape} for {len(raw)} environments; expected {raw.shape}")
+    if not np.isfinite(paid).all():
+        raise ValueError(f"reward {name}: {paid[~np.isfinite(paid)][0]}; expected finite numbers")
+    return paid - (raw - rewards)

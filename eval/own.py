@@ -1,0 +1,101 @@
+"""What users bring along: functions of their own modules, by a name `module:function`, and files of their own."""
+
+import functools
+import hashlib
+import importlib
+import os
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+FILES = (".json", ".toml", ".yaml", ".yml")
+Driver = Callable[[np.ndarray], np.ndarray]
+
+
+def is_own(name: str) -> bool:
+    """Does it name a function, and no file?"""
+    return ":" in name and not Path(name).exists()
+
+
+def function_named(name: str) -> Callable[..., Any]:
+    """A function of a module, which is looked for in the folder where we are, too.
+
+    Args:
+      name: "module:function", the module with dots: "project.drivers:careful".
+
+    Raises:
+      ValueError: there is no such module or function, or the module fails when it is imported; the message says which.
+    """
+    module, _, function = name.partition(":")
+    here = os.getcwd()
+    if here not in sys.path:
+        sys.path.insert(0, here)  # and it stays there, for what the module imports later
+    try:
+        found = getattr(importlib.import_module(module), function)
+    except ModuleNotFoundError as error:
+        if error.name and not module.startswith(error.name):
+            raise ValueError(f"{name}: {module} imports {error.name!r}, which is not there") from None
+        raise ValueError(f"{name}: no module {error.name!r} in {here}, nor installed") from None
+    except AttributeError:
+        if module in sys.modules:
+            raise ValueError(f"{name}: module {module!r} has no {function!r}") from None
+        raise
+    except Exception as error:
+        raise ValueError(f"{name}: {module} cannot be imported: {type(error).__name__}: {error}") from error
+    if not callable(found):
+        raise ValueError(f"{name}: {type(found).__name__} cannot be called; expected a function")
+    return found
+
+
+def driver_named(name: str, one_by_one: bool = False) -> Driver:
+    """A policy: observations `[B, ...]` -> actions `[B]`.
+
+    Args:
+      name: as for `function_named`.
+      one_by_one: the function maps one observation to one action.
+
+    Raises:
+      ValueError: as `function_named`; when it drives, if it does not answer with one action for each observation.
+    """
+    return functools.partial(_checked, function_named(name), name, one_by_one)
+
+
+def _checked(function: Callable[..., Any], name: str, one_by_one: bool, observations: np.ndarray) -> np.ndarray:
+    """Its actions, if there is one for each observation."""
+    if one_by_one:
+        return np.array([function(observation) for observation in observations])
+    actions = np.asarray(function(observations))
+    if actions.ndim == 0 or len(actions) != len(observations):
+        raise ValueError(
+            f"{name}: returned an array of shape {actions.shape} for {len(observations)} observations; expected one "
+            "action for each; `rss-shield test --one-by-one` takes functions of one observation"
+        )
+    return actions
+
+
+def digests(values: Iterable[Any]) -> dict[str, str]:
+    """Of what is named among some values: functions and files -> what tells one state of their source from another.
+
+    A module that the named one imports is not looked at.
+    """
+    found = {}
+    for name in dict.fromkeys(value for value in values if isinstance(value, str)):
+        source = _source(name)
+        if source is not None:
+            found[name] = hashlib.sha256(source.read_bytes()).hexdigest()[:16]
+    return found
+
+
+def _source(name: str) -> Path | None:
+    if name.lower().endswith(FILES):
+        return Path(name) if Path(name).is_file() else None
+    if not is_own(name):
+        return None
+    function = function_named(name)
+    file = getattr(sys.modules[name.partition(":")[0]], "__file__", None) or getattr(
+        getattr(function, "__code__", None), "co_filename", None
+    )
+    return Path(file) if file and Path(file).is_file() else None
