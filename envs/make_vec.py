@@ -17,6 +17,7 @@ from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
 from rss_shield.envs.fast.semantic import SemanticVectorEnv
 from rss_shield.envs.fast.vector import FastVectorEnv
 from rss_shield.envs.fast.views.record import KINEMATICS, TIME_TO_COLLISION
+from rss_shield.envs.highway.multi_agent import check_agents, check_replace_of_agents
 from rss_shield.envs.make import make
 from rss_shield.envs.options import (
     MODES,
@@ -36,6 +37,7 @@ from rss_shield.envs.options import (
 )
 from rss_shield.envs.semantic.settings import SemanticSettings, check_unreplaced, semantic_settings
 from rss_shield.envs.sensing import Sensing
+from rss_shield.envs.stock import hands_out_rewards
 from rss_shield.shield.ground import Ground
 from rss_shield.shield.risk import RiskSettings
 
@@ -61,7 +63,8 @@ def make_vec(
     (`NormalizeObservation`, `FlattenObservation`) take `autoreset_mode=AutoresetMode.NEXT_STEP` on either.
 
     Args:
-      env_id: "highway-fast-v0", "highway-v0", ...
+      env_id: "highway-fast-v0", "highway-v0", ...; "intersection-multi-agent-v0" for several agents, see
+        `FastVectorEnv`.
       num_envs: how many.
       shield: "override", "monitor", or None for bare environments.
       backend: "fast", the compiled engine, or "highway-env", the original one after the other.
@@ -123,7 +126,9 @@ def _in_engine(
 ) -> VectorEnv:
     _check_supported(options, rest)
     scenario = compile_scenario(env_id, config, max_episode_steps=rest.get("max_episode_steps"))
-    settings = _settings_in(scenario.stock, shield, options) if shield is not None else None
+    settings = _settings_in(scenario, shield, options) if shield is not None else None
+    if semantic is not None and scenario.agents is not None:
+        raise Unsupported("semantic_actions of several agents", "False")
     penalty, by_change = float(options.intervention_penalty), options.penalty_on == "change"
     replaces, risk = shield is not None and options.replace == "decision", _risk_in(shield, options)
     wanted = autoreset_mode
@@ -157,12 +162,17 @@ def _check_supported(options: Options, rest: dict[str, Any]) -> None:
         raise Unsupported(f"render_mode = {rest['render_mode']!r}", f"{RENDER_MODES[0]!r}, or backend = 'highway-env'")
 
 
-def _settings_in(stock: Any, shield: str, options: Options) -> Settings:
-    check_environment(stock)
-    check_replace(options, stock)
+def _settings_in(scenario: Scenario, shield: str, options: Options) -> Settings:
+    stock = scenario.stock
+    if scenario.agents is None:
+        check_environment(stock)
+        check_replace(options, stock)
+    else:
+        check_agents(stock)
+        check_replace_of_agents(options)
     settings = settings_for(stock, options.params_in(stock), rules_of(options.rules), shield, options.conduct)
-    if settings.scheme == PLANS and not isinstance(stock.action_type, DiscreteMetaAction):
-        kind = type(stock.action_type).__name__
+    if settings.scheme == PLANS and not isinstance(scenario.kind, DiscreteMetaAction):
+        kind = type(scenario.kind).__name__
         raise Unsupported(f"action type {kind} with a shield where roads cross", "backend = 'highway-env'")
     return settings
 
@@ -219,11 +229,25 @@ _OF_GYMNASIUM = {  # arguments of its `make_vec` that mean something else here
 
 
 class _SideBySide(SyncVectorEnv):
-    """gymnasium's, for seeds of numpy as well."""
+    """gymnasium's, for seeds of numpy and several agents as well."""
 
     def reset(self, *, seed: Any = None, options: dict | None = None):
         several = seed is not None and np.ndim(seed) > 0
         return super().reset(seed=[seed_of(one) for one in seed] if several else seed_of(seed), options=options)
+
+    def _add_info(self, vector_infos: dict, env_info: dict, env_num: int) -> dict:
+        """gymnasium's; what is said of each of several agents becomes arrays, too."""
+        agents = env_info.get("agents")
+        if agents is None:
+            return super()._add_info(vector_infos, env_info, env_num)
+        rest = {name: value for name, value in env_info.items() if name != "agents"}
+        infos = super()._add_info(vector_infos, rest, env_num)
+        before = infos.get("agents", tuple({} for _ in agents))
+        infos["agents"] = tuple(
+            super(_SideBySide, self)._add_info(*one, env_num) for one in zip(before, agents, strict=True)
+        )
+        infos.setdefault("_agents", np.zeros(self.num_envs, bool))[env_num] = True
+        return infos
 
 
 def _autoreset(mode: Any) -> AutoresetMode:
@@ -235,7 +259,13 @@ def _autoreset(mode: Any) -> AutoresetMode:
 
 
 def _make_counted(env_id: str, shield: str | None, wrappers: list, options: dict) -> gym.Env:
-    env: gym.Env = RecordEpisodeStatistics(make(env_id, shield, **options))
+    one = make(env_id, shield, **options)
+    if hands_out_rewards(one):
+        raise ValueError(
+            f"env_id = {env_id!r} with backend = 'highway-env': each agent has a reward of its own, and gymnasium's "
+            "batches have room for one; expected 'intersection-multi-agent-v0', or backend = 'fast'"
+        )
+    env: gym.Env = RecordEpisodeStatistics(one)
     for wrapper in wrappers:
         env = wrapper(env)
     return env

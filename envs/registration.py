@@ -24,6 +24,9 @@ IN_ENGINE = (
     "roundabout-v1",
     "intersection-v0",
     "intersection-v2",
+    "intersection-multi-agent-v0",
+    "intersection-multi-agent-v1",
+    "intersection-multi-agent-v2",
 )
 ELSEWHERE = ("intersection-v1", "signalised-intersection-v0")
 

@@ -8,7 +8,7 @@ import gymnasium as gym
 import highway_env  # noqa: F401  registers the environments
 import numpy as np
 from gymnasium.wrappers import TimeLimit
-from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.envs.common.abstract import AbstractEnv, MultiAgentWrapper
 from highway_env.envs.common.action import MultiAgentAction
 from highway_env.envs.intersection_env import IntersectionEnv
 from highway_env.envs.merge_env import MergeEnv
@@ -145,6 +145,15 @@ def _write(kind: type, values: dict[str, float]) -> None:
 def _has_duration(env: Any) -> bool:
     """Does an environment end by itself when `duration` is over?"""
     return "duration" in type(env).default_config()
+
+
+def hands_out_rewards(env: gym.Env) -> bool:
+    """Does highway-env give each agent a reward of its own, in place of one for all?"""
+    while isinstance(env, gym.Wrapper):
+        if isinstance(env, MultiAgentWrapper):
+            return True
+        env = env.env
+    return False
 
 
 class Upkeep:

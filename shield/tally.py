@@ -271,12 +271,16 @@ _SINCE_RESET = (
 
 def info_at(infos: dict[str, Any], e: int) -> dict[str, Any]:
     """Infos of one environment out of those of a batch, as plain Python values."""
-    info = {key: info_at(values, e) if isinstance(values, dict) else _one(values, e) for key, values in infos.items()}
+    info = {key: _at(values, e) for key, values in infos.items()}
     if info.get("blame") == "":
         info["blame_evidence"] = {}
     return info
 
 
-def _one(values: np.ndarray, e: int) -> Any:
-    """Of environment `e`; a continuous action is an array."""
+def _at(values: Any, e: int) -> Any:
+    """Of environment `e`; a tuple has what is said of each agent, a continuous action is an array."""
+    if isinstance(values, dict):
+        return info_at(values, e)
+    if isinstance(values, tuple):
+        return tuple(_at(one, e) for one in values)
     return values.item(e) if values.ndim == 1 else values[e]

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from gymnasium import spaces
 from highway_env import utils
-from highway_env.envs.common.action import ContinuousAction, DiscreteAction, DiscreteMetaAction
+from highway_env.envs.common.action import ContinuousAction, DiscreteAction, DiscreteMetaAction, MultiAgentAction
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
@@ -36,7 +36,7 @@ from rss_shield.envs.fast.views.describe import Glance, views_of
 from rss_shield.envs.fast.views.record import View
 from rss_shield.envs.roads.hostile import NO_VICE, vice_of
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network, compile_network
-from rss_shield.envs.stock import drivers_unchanged, make_stock
+from rss_shield.envs.stock import drivers_unchanged, hands_out_rewards, make_stock
 
 
 class Scenario(NamedTuple):
@@ -50,6 +50,9 @@ class Scenario(NamedTuple):
     view: View  # what the kernel observes itself, or
     glances: tuple[Glance, ...]  # what is observed apart from it
     labels: np.ndarray  # meta-action of each action, as in `DiscreteMetaAction.ACTIONS_ALL`
+    agents: int | None  # how many egos where each has an action of its own, None = there is one, with one
+    apart: bool  # rewards are the agents' own, not one for all
+    kind: Any  # highway-env's type of an agent's action
     choices: np.ndarray | None  # `[A, 2]` acceleration [m/s^2] and steering [rad] of each `DiscreteAction`
     lane_odds: np.ndarray  # cumulative odds of the lanes that traffic starts on
     linear: np.ndarray | None  # `[6]` as in `linear_drivers`, where the traffic is of that kind
@@ -64,7 +67,7 @@ class Scenario(NamedTuple):
 
         The arithmetic is that of highway-env, in the type of the actions.
         """
-        return _commands(self.stock.action_type, actions)
+        return _commands(self.kind, actions)
 
 
 def compile_scenario(
@@ -94,9 +97,13 @@ def compile_scenario(
     wrapped = make_stock(env_id, config=config, max_episode_steps=max_episode_steps)
     env: Any = wrapped.unwrapped
     given = env.config
-    kind = _checked(given)
+    agents, apart = _agents_in(scenario, env), hands_out_rewards(wrapped)
+    if apart and agents is None:
+        raise Unsupported(f"one agent in {env_id}", "action type MultiAgentAction")
+    kind = _checked(given, agents)
+    action_type = env.action_type if agents is None else env.action_type.agents_action_types[0]
     record = np.zeros(1, CONFIG)
-    record["scenario"], record["end_x"] = scenario, np.inf
+    record["scenario"], record["end_x"], record["agents"] = scenario, np.inf, agents or 1
     record["dt"] = 1 / given["simulation_frequency"]
     record["frames"] = int(given["simulation_frequency"] // given["policy_frequency"])
     record["period"] = 1 / given["policy_frequency"]
@@ -104,7 +111,7 @@ def compile_scenario(
     record["duration"] = given.get("duration", np.inf)
     _fill_traffic(record, kind)
     record["vice"], record["bounded"] = vice_of(given["other_vehicles_type"]) or (NO_VICE, False)
-    target_speeds, labels, choices = _fill_action(record, env.action_type)
+    target_speeds, labels, choices = _fill_action(record, action_type)
     number = {index: i for i, index in enumerate(env.road.network.lanes_dict())}
     describe_of(scenario)(record, given, env, number)
     record["gap_braking"] = 2 * np.sqrt(-record["comfort_acc_max"] * record["comfort_acc_min"])
@@ -132,6 +139,9 @@ def compile_scenario(
         view,
         glances,
         labels,
+        agents,
+        apart,
+        action_type,
         choices,
         exiting.lane_odds(given) if scenario == EXIT else np.ones(1),
         usual_habits(kind),
@@ -146,6 +156,8 @@ def compile_scenario(
 def _check_action(scenario: int, env_id: str, config: dict) -> None:
     """Do observation and reward of the environment understand the action? In highway-env some do not."""
     asked = config.get("action") or {}
+    if asked.get("type") == "MultiAgentAction":
+        asked = asked.get("action_config") or {}
     kind = asked.get("type", "DiscreteMetaAction")
     two_axes = kind == "ContinuousAction" and asked.get("longitudinal", True) and asked.get("lateral", True)
     if kind != "DiscreteMetaAction" and scenario == TWO_WAY:
@@ -165,7 +177,19 @@ def _check_traffic(asked: str) -> None:
         raise Unsupported(f"other_vehicles_type = {asked!r}", f"one of {', '.join(KINDS)}, or one of HOSTILE")
 
 
-def _checked(given: dict) -> type[IDMVehicle]:
+def _agents_in(scenario: int, env: Any) -> int | None:
+    """How many egos have an action of their own; None where there is one action."""
+    if not isinstance(env.action_type, MultiAgentAction):
+        return None
+    count = len(env.controlled_vehicles)
+    if scenario != INTERSECTION:
+        raise Unsupported(f"controlled_vehicles = {count}", "1, or an intersection")
+    if count < 1 or count != env.config["controlled_vehicles"]:
+        raise Unsupported(f"controlled_vehicles = {env.config['controlled_vehicles']}", "a whole number from 1")
+    return count
+
+
+def _checked(given: dict, agents: int | None) -> type[IDMVehicle]:
     """The kind of the traffic, if the engine can run a configuration."""
     asked = given["other_vehicles_type"]
     _check_traffic(asked)
@@ -173,7 +197,9 @@ def _checked(given: dict) -> type[IDMVehicle]:
         raise Unsupported(
             f"vehicles of {IDMVehicle.LENGTH:g} m x {IDMVehicle.WIDTH:g} m", f"{CAR_LENGTH:g} m x {CAR_WIDTH:g} m"
         )
-    if given.get("controlled_vehicles", 1) != 1:
+    if agents is not None and vice_of(asked) is not None:
+        raise Unsupported(f"other_vehicles_type = {asked!r} with several agents", "drivers who mean no harm")
+    if agents is None and given.get("controlled_vehicles", 1) != 1:
         raise Unsupported(f"controlled_vehicles = {given['controlled_vehicles']}", "1")
     if given["manual_control"]:
         raise Unsupported("manual_control = True", "False")

@@ -17,7 +17,6 @@ from rss_shield.envs.conditions import group_of, held
 from rss_shield.envs.decisions.foresight import without_anticipation
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.draws import load_generator
-from rss_shield.envs.fast.drivers import note_change, take_meta_action
 from rss_shield.envs.fast.envs.intersection import let_traffic_flow, open_intersection
 from rss_shield.envs.fast.following import follow
 from rss_shield.envs.fast.foresight import foresee, make_desk
@@ -25,25 +24,44 @@ from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.guard import (
     Ways,
     carry_over,
-    check_contact,
     compile_ways,
+    cost_of,
     distances_of,
+    guard,
     make_watch,
     plans_of,
-    refuse_lane_change,
+    report,
     ride_of,
     start_judging,
     start_watch,
-    watch_frame,
 )
 from rss_shield.envs.fast.linear_drivers import start_habits
 from rss_shield.envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past
 from rss_shield.envs.fast.rating import is_truncated
 from rss_shield.envs.fast.risk import RISK, Field, begin_looks, compile_field, meter_of, report_risk, start_risk
+from rss_shield.envs.fast.seats import (
+    NO_ACTION,
+    Seats,
+    Told,
+    begin_seats,
+    charge,
+    earn,
+    guard_seat,
+    is_over,
+    judge_seats,
+    keep_last,
+    make_seats,
+    make_told,
+    move_seats,
+    report_seats,
+    restart_seats,
+    stop_after,
+    take_actions,
+)
 from rss_shield.envs.fast.senses import GHOSTS, Sensed, aware_of, begin_episode, look, make_sensed
 from rss_shield.envs.fast.sight import make_sight, project, sort_along_x
-from rss_shield.envs.fast.state import CAR, EPISODE, LINEAR_CAR, STEP
-from rss_shield.envs.fast.tasks import is_terminated, make_scene, rate
+from rss_shield.envs.fast.state import CAR, EPISODE, LINEAR_CAR, STEP, TRAFFIC
+from rss_shield.envs.fast.tasks import make_scene
 from rss_shield.envs.fast.threads import Crew
 from rss_shield.envs.fast.views.apart import call_of
 from rss_shield.envs.fast.views.record import NONE, View
@@ -53,20 +71,18 @@ from rss_shield.envs.roads.lanes import tightest
 from rss_shield.envs.roads.network import Network
 from rss_shield.envs.semantic.outlook import PLAN_FIELDS
 from rss_shield.envs.sensing import Sensing
-from rss_shield.shield._numba.compiled import compiling_quickly, inner, part, rare
+from rss_shield.shield._numba.compiled import compiling_quickly, inner, rare
 from rss_shield.shield.comfort import RIDE
 from rss_shield.shield.ground import Ground
 from rss_shield.shield.junctions.memory import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
 from rss_shield.shield.risk import RiskSettings
 from rss_shield.shield.table import table_for
-from rss_shield.shield.tally import end_decision, start_decision
-from rss_shield.shield.verdicts import charges_ego
+from rss_shield.shield.tally import start_decision
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
 # what an environment does on a call; the last two where its kernel is called twice, with a look between
 DECIDE, RESTART, STAY, GO_ON, DONE = range(5)
-NO_ACTION = np.int64(-1)
 _PATIENCE = 6.0  # seconds of silence before the first call explains itself
 
 
@@ -101,10 +117,11 @@ class Batch(NamedTuple):
     rides: np.ndarray | None  # `[E]` RIDE
     risks: np.ndarray | None  # `[E]` RISK, with `World.field`
     sensed: Sensed | None  # where an ego does not see what is there
+    seats: Seats | None  # where there are several egos; they have the rest of what a shield remembers, too
 
 
 class Inputs(NamedTuple):
-    """What the agents want. Only one of the first two kinds of command counts."""
+    """What the agents want. Only one of the first two kinds of command counts; those of several egos are `Seats`'."""
 
     actions: np.ndarray  # `[E]` discrete actions
     commands: np.ndarray  # `[E, 2]` acceleration [m/s^2] and steering [rad]
@@ -124,6 +141,7 @@ class Outputs(NamedTuple):
     final_steps: np.ndarray  # `[E]` STEP, likewise
     risks: np.ndarray | None  # `[E]` RISK, of the new episode where one began; with `World.field`
     final_risks: np.ndarray | None  # `[E]` likewise, written where an episode ended and another began
+    told: Told | None  # of each of several egos
 
 
 class Film(NamedTuple):
@@ -159,24 +177,26 @@ def _hold(cars, episode, ground):
     if ground is not None:
         for i in range(episode.vehicles):
             car = cars[i]
-            group = -1 if i == episode.ego else car.group
+            group = car.group if car.kind == TRAFFIC else -1
             car.acceleration = held(car.acceleration, ground, car.x, group)
 
 
 @inner
-def _go_on(cars, episode, order, world, plans, watch, flow):
+def _go_on(e, cars, episode, order, world, plans, watch, flow, seats):
     """Cars come and go between two decisions."""
     if flow is not None:
         was_ego = episode.ego
         let_traffic_flow(cars, episode, order, world.network, world.config[0], flow[0], world.linear)
         if plans is not None:
             carry_over(episode, cars, plans.crossings, was_ego, watch)
+        move_seats(e, cars, episode, world, watch, seats)
 
 
 @rare
-def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, out, aware):
+def _restart(
+    e, cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, out, aware, seats, told
+):
     """Begin a new episode and observe it."""
-    config, lanes = world.config[0], world.network.lanes
     _populate(cars, episode, order, world, sight, world.flow)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
     survey(cars, episode, world.network, sight, world.flow)
@@ -184,8 +204,10 @@ def _restart(cars, episode, order, world, sight, distances, plans, ride, meter, 
     start_watch(cars, episode, distances, plans, ride, watch, aware)
     start_risk(meter)
     start_decision(step)
-    step.raw_reward = rate(cars, episode, NO_ACTION, lanes, sight, config, step)
-    _report(cars, episode, ride, 0.0, step)
+    restart_seats(e, cars, episode, world, watch, seats, told)
+    step.raw_reward = earn(e, cars, episode, NO_ACTION, world, sight, step, seats, told)
+    report(cars, episode, ride, 0.0, step)
+    report_seats(e, cars, world, seats, told)
     _see_apart(cars, episode, world, sight, out, aware)
 
 
@@ -223,52 +245,54 @@ def _see_apart(cars, episode, world, sight, out, aware):
     _see(cars, episode, world, sight, out, aware)
 
 
-@part
-def _report(cars, episode, ride, cost, step):
-    """Fill in what every step says."""
-    ego = cars[episode.ego]
-    step.speed, step.crashed, step.time = ego.speed, ego.crashed, episode.time
-    step.episode_return, step.episode_length = episode.return_, episode.steps
-    if ride is not None:
-        end_decision(step, episode, ride, cost)
-
-
 @unfolded
 def _advance(
-    e, cars, episode, order, world, sight, distances, plans, ride, meter, watch, settings, inputs, film, step, aware
+    e,
+    cars,
+    episode,
+    order,
+    world,
+    sight,
+    distances,
+    plans,
+    ride,
+    meter,
+    watch,
+    settings,
+    inputs,
+    film,
+    step,
+    aware,
+    seats,
+    told,
 ):
     """One decision of one environment, frame by frame."""
     config, net, flow = world.config[0], world.network, world.flow
     lanes = net.lanes
-    ego = cars[episode.ego]
     survey(cars, episode, net, sight, flow)
     start_decision(step)
     start_judging(aware)
     begin_looks(meter)
+    begin_seats(e, cars, episode, world, seats, told)
     had_contact = episode.blame != 0
     for frame in range(config.frames):
         if frame == 0:
-            if config.meta_actions:
-                label = world.labels[inputs.actions[e]]
-                before = ego.target_lane
-                take_meta_action(cars, episode.ego, label, net, lanes, sight, world.target_speeds)
-                refuse_lane_change(before, cars, episode, lanes, sight, distances, plans, settings, step)
-            else:
-                ego.acceleration, ego.steering = inputs.commands[e, 0], inputs.commands[e, 1]
-                episode.nominal_acceleration, episode.nominal_steering = ego.acceleration, ego.steering
+            take_actions(e, cars, episode, world, sight, distances, plans, settings, inputs, step, seats, told)
         changing = look_around(cars, episode, order, net, sight, flow)
         # plans depend on the lanes that others head for, and those after the ego see the lane that it is given back:
         # the shield looks when those up to the ego have decided
         in_turn = ride is not None and (plans is not None or settings.table.rules.take_back)
-        first, last = 0, episode.ego + 1 if in_turn else episode.vehicles
+        turn, first, last = 0, 0, stop_after(0, e, episode, in_turn, seats)
         while first < episode.vehicles:  # a loop, lest the kernel contain it twice
             changing = think(cars, episode, first, last, changing, net, sight, config)
             if first == 0:
                 follow(e, frame, inputs.trajectories, cars, episode, lanes, sight)
-                changing = _guard(
+                changing = guard(
                     cars, episode, changing, net, sight, distances, plans, ride, meter, watch, settings, step, aware
                 )
-            first, last = last, episode.vehicles
+            changing = guard_seat(turn, e, cars, changing, world, sight, watch, settings, seats, told)
+            turn += 1
+            first, last = last, stop_after(turn, e, episode, in_turn, seats)
         _hold(cars, episode, world.ground)
         act(cars, episode, order, net, sight, config, flow)
         if film.slots[e] >= 0:
@@ -276,27 +300,8 @@ def _advance(
                 film.cars[film.slots[e], frame, i] = cars[i]
     episode.time += config.period
     episode.steps += 1
-    return _cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step, aware)
-
-
-@inner
-def _guard(cars, episode, changing, net, sight, distances, plans, ride, meter, watch, settings, step, aware):
-    """`watch_frame` where there is a shield; returns `changing`, with an ego that was given its lane back."""
-    if ride is None:
-        return changing
-    watch_frame(cars, episode, net, sight, distances, plans, ride, meter, watch, settings, step, aware)
-    return note_change(cars, episode.ego, changing, sight)
-
-
-@inner
-def _cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step, aware):
-    """1.0 if the ego has broken its proper response in a decision, or a contact was its fault."""
-    cost = 0.0
-    if ride is not None:
-        check_contact(cars, episode, lanes, sight, distances, plans, watch, settings, aware)
-        if step.broken_duties > 0 or (not had_contact and charges_ego(episode.blame - 1)):
-            cost = 1.0
-    return cost
+    judge_seats(e, cars, world, sight, watch, settings, seats, told)
+    return cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step, aware)
 
 
 @kernel
@@ -306,6 +311,7 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
     Where observations are made apart from it, it waits for that after the decision: the next call goes on from there.
     """
     config, lanes, waits = world.config[0], world.network.lanes, world.sees.record[0].kind == NONE
+    seats, told = batch.seats, outputs.told
     for e in range(first, last):
         if inputs.todo[e] == DONE:
             continue
@@ -318,14 +324,15 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
         aware = aware_of(e, batch.sensed, world.frames)
         if inputs.todo[e] == STAY:
             _start_outputs(e, outputs)
-            _report(cars, episode, ride, 0.0, step)
+            report(cars, episode, ride, 0.0, step)
             report_risk(e, meter, outputs.risks)
+            report_seats(e, cars, world, seats, told)
             inputs.todo[e] = DONE
             continue
         if inputs.todo[e] == RESTART or (inputs.todo[e] == DECIDE and autoreset == NEXT_STEP and episode.ended):
             _start_outputs(e, outputs)
             places = sight, distances, plans, ride, meter
-            _restart(cars, episode, order, world, *places, watch, step, observation, aware)
+            _restart(e, cars, episode, order, world, *places, watch, step, observation, aware, seats, told)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = DONE
             continue
@@ -348,33 +355,36 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
                 film,
                 step,
                 aware,
+                seats,
+                told,
             )
             _see(cars, episode, world, sight, observation, aware)
-            reward = rate(cars, episode, inputs.actions[e], lanes, sight, config, step)
+            reward = earn(e, cars, episode, inputs.actions[e], world, sight, step, seats, told)
             step.raw_reward = reward
-            charged = step.acceleration_changed if by_change else float(step.overridden)
-            reward -= penalty * (charged / max(step.frames, 1))
+            reward -= charge(e, step, penalty, by_change, seats, told)
             episode.return_ += reward
             outputs.rewards[e] = reward
-            outputs.terminated[e] = is_terminated(cars, episode, lanes, sight, config)
+            outputs.terminated[e] = is_over(e, cars, episode, lanes, sight, config, seats)
             outputs.truncated[e] = is_truncated(episode, config)
             episode.ended = outputs.terminated[e] or outputs.truncated[e]
-            _report(cars, episode, ride, cost, step)
+            report(cars, episode, ride, cost, step)
             report_risk(e, meter, outputs.risks)
+            report_seats(e, cars, world, seats, told)
             inputs.todo[e] = GO_ON
             if waits:
                 continue
         inputs.todo[e] = DONE
-        _go_on(cars, episode, order, world, plans, watch, world.flow)
+        _go_on(e, cars, episode, order, world, plans, watch, world.flow, seats)
         if episode.ended and autoreset == SAME_STEP:
             for k in range(len(observation)):
                 outputs.final_observations[e, k] = observation[k]
             outputs.final_steps[e] = step
             report_risk(e, meter, outputs.final_risks)
+            keep_last(e, world, seats, told)
             begin_episode(e, batch.sensed)
             aware = aware_of(e, batch.sensed, world.frames)
             places = sight, distances, plans, ride, meter
-            _restart(cars, episode, order, world, *places, watch, step, observation, aware)
+            _restart(e, cars, episode, order, world, *places, watch, step, observation, aware, seats, told)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = RESTART
 
@@ -424,13 +434,19 @@ class Engine:
         self.settings = settings or Settings(table_for(PRESETS["simulator"], Rules(), 1.0), False)
         network, net = scenario.stock.road.network, scenario.network
         seen = n if sensing is None else n + GHOSTS
-        frames = ways = past = crossings = None
+        frames = ways = past = crossings = rides = risks = seats = None
+        if settings is not None:
+            rides = np.zeros(num_envs, RIDE)
+            risks = None if risk is None else np.zeros(num_envs, RISK)
         if settings is not None and settings.scheme == PLANS:
             ways = compile_ways(network, net, float(scenario.config["dt"][0]))
             crossings = np.zeros((num_envs, n), CROSSING)
         elif settings is not None:
             frames = compile_lane_frames(network, settings, ground)
             past = make_past(num_envs, seen)
+        if scenario.agents is not None:
+            crossings = rides = risks = None
+            seats = make_seats(scenario.agents, num_envs, n, settings is not None, risk is not None)
         self.world = World(
             scenario.config,
             scenario.flow,
@@ -451,9 +467,10 @@ class Engine:
             np.zeros((num_envs, n), np.int64),
             past,
             crossings,
-            None if settings is None else np.zeros(num_envs, RIDE),
-            None if risk is None else np.zeros(num_envs, RISK),
+            rides,
+            risks,
             None if sensing is None else make_sensed(sensing, self.settings, num_envs, n),
+            seats,
         )
         frames_of_decision = np.zeros((0, int(scenario.config["frames"][0]), n), self.batch.cars.dtype)
         self.film = Film(np.full(num_envs, -1, np.int64), frames_of_decision)
@@ -501,8 +518,13 @@ class Engine:
         Args:
           actions: `[E]` int64 meta-actions, or
           commands: `[E, 2]` acceleration [m/s^2] and steering [rad]; then actions only count in the reward.
+            Of several egos `[A, E]` and `[A, E, 2]`.
         """
-        e = self.num_envs
+        e, seats = self.num_envs, self.batch.seats
+        if seats is not None:
+            seats.actions[:] = 0 if actions is None else actions
+            seats.commands[:] = 0.0 if commands is None else commands
+            actions = commands = None
         actions = np.full(e, -1) if actions is None else actions
         commands = np.zeros((e, 2)) if commands is None else commands
         # compiled for these types and no others
@@ -534,6 +556,7 @@ class Engine:
             np.zeros(e, STEP),
             None if self.batch.risks is None else np.zeros(e, RISK),
             None if self.batch.risks is None else np.zeros(e, RISK),
+            None if self.batch.seats is None else make_told(self.batch.seats),
         )
         rules = (self.settings, self.penalty, self.by_change, self.autoreset)
         common = (self.world, self.batch, inputs, outputs, self.film, self._watch, *rules)
@@ -550,8 +573,10 @@ class Engine:
             self._look(acts, outputs.observations)
             work()
             self._look(inputs.todo == RESTART, outputs.observations)
-        if self.batch.episodes["overflow"].any():
-            self.batch.episodes["overflow"] = False
+        several = () if self.batch.seats is None else (self.batch.seats.episodes,)
+        if any(episodes["overflow"].any() for episodes in (self.batch.episodes, *several)):
+            for episodes in (self.batch.episodes, *several):
+                episodes["overflow"] = False
             raise OverflowError(
                 f"more than {self.scenario.capacity} road users in one environment; "
                 "expected fewer, or a larger `capacity` in `compile_scenario`"
@@ -563,7 +588,10 @@ class Engine:
         """Make the observations that are made apart, of the environments `which` `[E]`, into `out` `[E, size]`."""
         if not which.any():
             return
+        seats, egos = self.batch.seats, self.batch.episodes["ego"]
+        first = egos.copy()
         for g, glance in enumerate(self.scenario.glances):
+            egos[:] = first if seats is None else seats.episodes["ego"][glance.agent]
             entry, arguments = call_of(glance, self.world, self.batch, self._sights[0], which, out)
             look = self._looks[g] = self._looks[g] or _specialise(entry, *arguments)
 
@@ -572,6 +600,7 @@ class Engine:
                 look(first, last, *given)
 
             self._crew.work(self.num_envs, part)
+        egos[:] = first
 
     def close(self) -> None:
         """Give the threads back."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from rss_shield.envs._numpy.floats import norm
 from rss_shield.envs.fast.collisions import is_near, overlap
+from rss_shield.envs.fast.drivers import note_change
 from rss_shield.envs.fast.neighbours import (
     Distances,
     Past,
@@ -56,12 +57,13 @@ from rss_shield.shield.tally import (
     copy_judgement,
     count_change,
     count_frame,
+    end_decision,
     enter_contact,
     note_executed,
     start_decision,
     start_episode,
 )
-from rss_shield.shield.verdicts import weight_of
+from rss_shield.shield.verdicts import charges_ego, weight_of
 
 _MOST_TURNED = 0.9  # sine of the angle by which a bend may turn a car against its lane
 
@@ -130,8 +132,8 @@ def distances_of(e, frames, past):
 
 @inner
 def plans_of(e, ways, crossings):
-    """`Plans` of environment `e` of a batch."""
-    if ways is None:
+    """`Plans` of environment `e` of a batch; None where nobody, or somebody else, remembers crossings."""
+    if ways is None or crossings is None:
         return None
     return Plans(ways, crossings[e])
 
@@ -164,6 +166,36 @@ def start_watch(cars, episode, distances, plans, ride, watch, aware):
     episode.pairs_examined = episode.pairs_possible = 0
     episode.nominal_acceleration = episode.nominal_steering = 0.0
     start_episode(episode)
+
+
+@inner
+def guard(cars, episode, changing, net, sight, distances, plans, ride, meter, watch, settings, step, aware):
+    """`watch_frame` where there is a shield; returns `changing`, with an ego that was given its lane back."""
+    if ride is None:
+        return changing
+    watch_frame(cars, episode, net, sight, distances, plans, ride, meter, watch, settings, step, aware)
+    return note_change(cars, episode.ego, changing, sight)
+
+
+@inner
+def cost_of(cars, episode, lanes, sight, distances, plans, ride, watch, settings, had_contact, step, aware):
+    """1.0 if the ego has broken its proper response in a decision, or a contact was its fault."""
+    cost = 0.0
+    if ride is not None:
+        check_contact(cars, episode, lanes, sight, distances, plans, watch, settings, aware)
+        if step.broken_duties > 0 or (not had_contact and charges_ego(episode.blame - 1)):
+            cost = 1.0
+    return cost
+
+
+@part
+def report(cars, episode, ride, cost, step):
+    """Fill in what every step says."""
+    ego = cars[episode.ego]
+    step.speed, step.crashed, step.time = ego.speed, ego.crashed, episode.time
+    step.episode_return, step.episode_length = episode.return_, episode.steps
+    if ride is not None:
+        end_decision(step, episode, ride, cost)
 
 
 @part
@@ -489,7 +521,9 @@ def scene_of(cars, episode, sight, plans, settings, judging):
     """
     n, roads = episode.cars - 1, plans.ways.roads
     for i in range(n):
-        _describe(cars[car_of(i, episode)], plans.ways.choice, sight.on_road[i])
+        other = cars[car_of(i, episode)]
+        _describe(other, plans.ways.choice, sight.on_road[i])
+        sight.on_road[i].alert = other.kind == META  # another ego, behind a shield of its own
         if judging:
             sight.on_road[i].wreck = plans.crossings[i].wreck
     _describe(cars[episode.ego], plans.ways.choice, sight.on_road[n])

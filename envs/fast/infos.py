@@ -4,6 +4,9 @@ Arrays of numbers are views of the engine's records; nothing is computed for an 
 nobody asks about.
 """
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 
 from rss_shield.envs.fast.config import Scenario
@@ -15,8 +18,23 @@ from rss_shield.shield.tally import shield_infos
 _STATES = np.array(list(STATES), object)
 
 
+class Agents(NamedTuple):
+    """What is said of A egos."""
+
+    steps: np.ndarray  # `[A, E]` STEP
+    risks: np.ndarray | None  # `[A, E]` RISK, None = nobody asked
+
+    def each(self) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+        """Of one after the other."""
+        return zip(self.steps, [None] * len(self.steps) if self.risks is None else self.risks, strict=True)
+
+
 def step_infos(
-    steps: np.ndarray, scenario: Scenario, settings: Settings | None, risks: np.ndarray | None = None
+    steps: np.ndarray,
+    scenario: Scenario,
+    settings: Settings | None,
+    risks: np.ndarray | None = None,
+    agents: Agents | None = None,
 ) -> dict:
     """Infos of a batch.
 
@@ -25,11 +43,13 @@ def step_infos(
       scenario: what was run.
       settings: of the shield, None = no shield.
       risks: `[E]` RISK, None = nobody asked.
+      agents: what is said of each of several egos.
 
     Returns:
       Dictionary of arrays `[E]`: `speed`, `crashed`, `rewards` (one array per component), at intersections
       `agents_rewards` and `agents_terminated` (tuples, one value for each agent) and, with a shield, what
-      `ShieldWrapper` documents. `blame_evidence` counts where `blame` is not "".
+      `ShieldWrapper` documents. `blame_evidence` counts where `blame` is not "". Of several egos `agents` has that, a
+      tuple with such a dictionary for each.
     """
     infos = {
         "speed": steps["speed"],
@@ -38,20 +58,30 @@ def step_infos(
     }
     kind = scenario.config["scenario"][0]
     if kind == INTERSECTION:
-        infos["agents_rewards"] = _of_one_agent(steps["raw_reward"])
-        infos["agents_terminated"] = _of_one_agent(steps["crashed"] | steps["success"])
+        each = steps[None] if agents is None else agents.steps
+        infos["agents_rewards"] = _tuples(each["raw_reward"])
+        infos["agents_terminated"] = _tuples(each["crashed"] | each["success"])
+    if agents is not None:
+        if settings is not None:
+            infos["raw_reward"] = infos["agents_rewards"] if scenario.apart else steps["raw_reward"]
+            infos["agents"] = tuple(_infos_of(*one, settings) for one in agents.each())
+        return infos
     if kind == EXIT or (kind == INTERSECTION and settings is not None):  # a bare intersection does not say it
         infos["is_success"] = steps["success"]
     if settings is not None:
-        infos |= shield_infos(steps, settings.table.dt) | {"time": steps["time"], "raw_reward": steps["raw_reward"]}
-    if risks is not None and settings is not None:
-        infos |= _risk_infos(risks, settings.table.dt)
+        infos |= {"time": steps["time"], "raw_reward": steps["raw_reward"]} | _infos_of(steps, risks, settings)
     return infos
 
 
-def _of_one_agent(values: np.ndarray) -> np.ndarray:
-    """As tuples with one value each, which is what highway-env says of its agents."""
-    return np.fromiter(zip(values.tolist(), strict=True), object, len(values))
+def _infos_of(steps: np.ndarray, risks: np.ndarray | None, settings: Settings) -> dict:
+    """What a shield says of one ego."""
+    infos = shield_infos(steps, settings.table.dt)
+    return infos if risks is None else infos | _risk_infos(risks, settings.table.dt)
+
+
+def _tuples(values: np.ndarray) -> np.ndarray:
+    """`[A, E]` as tuples with one value for each agent, which is what highway-env says of them."""
+    return np.fromiter(zip(*values.tolist(), strict=True), object, values.shape[1])
 
 
 def _risk_infos(risks: np.ndarray, dt: float) -> dict:

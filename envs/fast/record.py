@@ -13,6 +13,7 @@ CONFIG = np.dtype(
         ("dt", "f8"),  # length of a frame [s]
         ("frames", "i8"),  # per decision
         ("period", "f8"),  # length of a decision [s]
+        ("agents", "i8"),  # egos
         ("duration", "f8"),  # of an episode [s], inf = unlimited
         ("max_steps", "i8"),  # decisions of an episode, 0 = unlimited
         ("offroad_terminal", "?"),

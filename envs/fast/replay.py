@@ -1,6 +1,7 @@
 """Engine states in real highway-env environments and back: for rendering, and for checking."""
 
 import numpy as np
+from highway_env.envs.common.action import MultiAgentAction
 from highway_env.road.lane import AbstractLane
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.utils import class_from_path
@@ -38,8 +39,16 @@ def show(env, cars: np.ndarray, network: Network, episode: np.ndarray | None = N
         else:
             road.vehicles.append(_vehicle(env, car, indices, network))
     ego = 0 if episode is None else int(episode["ego"])
-    env.controlled_vehicles = [road.vehicles[ego]]
-    env.observation_type.observer_vehicle = env.action_type.controlled_vehicle = road.vehicles[ego]
+    agents = [road.vehicles[ego]]
+    if isinstance(env.action_type, MultiAgentAction):
+        own = [vehicle for car, vehicle in zip(cars, road.vehicles, strict=False) if car["kind"] in (META, DIRECT)]
+        agents = own or agents
+        for kind, vehicle in zip(env.action_type.agents_action_types, agents, strict=True):
+            kind.controlled_vehicle = vehicle
+    for kind, vehicle in zip(getattr(env.observation_type, "agents_observation_types", ()), agents, strict=True):
+        kind.observer_vehicle = vehicle
+    env.controlled_vehicles = agents
+    env.observation_type.observer_vehicle = env.action_type.controlled_vehicle = agents[0]
     if episode is not None:
         env.time = float(episode["time"])
         env.steps = int(episode["steps"]) * int(env.config["simulation_frequency"] // env.config["policy_frequency"])

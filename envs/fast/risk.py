@@ -108,7 +108,7 @@ def compile_field(network, risk: RiskSettings, settings: Settings) -> Field:
 @inner
 def meter_of(e, field, risks):
     """`Meter` of environment `e` of a batch."""
-    if field is None:
+    if field is None or risks is None:
         return None
     return Meter(field, risks[e : e + 1])
 

@@ -26,6 +26,9 @@ SCENARIOS = {
     "roundabout-v1": ROUNDABOUT,
     "intersection-v0": INTERSECTION,
     "intersection-v2": INTERSECTION,
+    "intersection-multi-agent-v0": INTERSECTION,
+    "intersection-multi-agent-v1": INTERSECTION,
+    "intersection-multi-agent-v2": INTERSECTION,
 }
 _MODULES: dict[int, ModuleType] = {
     HIGHWAY: highway,
@@ -126,3 +129,10 @@ def is_terminated(cars, episode, lanes, sight, config):
     off_road = config.offroad_terminal and not is_on_road(cars, episode.ego, lanes, sight)
     arrived = config.scenario == INTERSECTION and intersection.has_arrived(cars, episode.ego, lanes, sight)
     return ego.crashed or ego.x > config.end_x or off_road or arrived
+
+
+@inner
+def is_terminated_together(cars, episode, egos, lanes, sight, config):
+    """Is the state terminal for several agents, `egos` `[A]` EPISODE? Only intersections have them."""
+    off_road = config.offroad_terminal and not is_on_road(cars, episode.ego, lanes, sight)
+    return off_road or intersection.is_over(cars, egos, lanes, sight)

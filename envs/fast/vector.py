@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector.utils import batch_space, create_empty_array
 from highway_env.envs.common.action import DiscreteMetaAction
 
 from rss_shield.envs.arguments import seed_of, whole
@@ -14,7 +14,7 @@ from rss_shield.envs.decisions.executed import executed_actions
 from rss_shield.envs.decisions.replacement import order_of, replace
 from rss_shield.envs.fast.config import Scenario
 from rss_shield.envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
-from rss_shield.envs.fast.infos import step_infos
+from rss_shield.envs.fast.infos import Agents, step_infos
 from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
 from rss_shield.envs.fast.pictures import Painter
 from rss_shield.envs.fast.recording import Recording
@@ -54,6 +54,12 @@ class FastVectorEnv(VectorEnv):
     key "_name" marks where "name" is valid: `raw_reward` and `is_success` are not where an episode has just
     begun, and `action` is 0 there. Where an episode ended, "episode" holds its return "r", length "l" and duration on
     the clock "t" [s]: in `final_info` if episodes begin in the same step, else in the infos themselves.
+
+    Of A agents on one road (`intersection-multi-agent-v0`) spaces are tuples, as in highway-env: actions are a tuple
+    of A arrays, observations another, and `infos["agents"]` is a tuple with what the shield says of each. The reward is
+    one for all, or where highway-env hands out each agent's (`-v1`, `-v2`) an array `[E, A]`, with `episode["r"]`
+    likewise; the penalty is subtracted from each agent's, or its mean from the reward of all. An episode ends for
+    everybody at once: when somebody has crashed or everybody has arrived. `infos["agents_terminated"]` says for whom.
 
     Args:
       scenario: what to run.
@@ -122,19 +128,19 @@ class FastVectorEnv(VectorEnv):
         self.recording.begin(restarted)
         self._began[restarted] = perf_counter()
         self._decided = np.zeros(self.num_envs, bool)
-        self._infos = self._told(outputs.steps, outputs.risks, self._decided)
+        self._infos = self._told(outputs, self._decided)
         return self._shaped(outputs.observations), _marked(self._infos, restarted, self._decided)
 
     def step(self, actions):
         """One decision everywhere.
 
         Args:
-          actions: `[E]` integers or `[E, A]` floats of the action space.
+          actions: `[E]` integers or `[E, A]` floats of the action space; of several agents a tuple of them.
 
         Returns:
           Observations `[E, ...]`, rewards `[E]`, terminated `[E]`, truncated `[E]`, infos.
         """
-        proposed = np.asarray(actions)
+        proposed = np.asarray(actions) if self.scenario.agents is None else self._of_each(actions)
         discrete, commands = self._commands(proposed)
         actions = proposed
         if self._order is not None:
@@ -146,16 +152,18 @@ class FastVectorEnv(VectorEnv):
         self.recording.advance(ended, began if next_step else None, same_step)
 
         self._decided = ~ended if same_step else ~began if next_step else self._everywhere
-        self._infos = self._told(outputs.steps, outputs.risks, self._decided, actions, proposed)
+        self._infos = self._told(outputs, self._decided, actions, proposed)
         infos = _marked(self._infos, self._everywhere, self._decided)
         if ended.any():
             if same_step:
                 infos |= self._finals(outputs, ended, actions, proposed)
             else:
-                episode = {name: np.where(ended, values, 0) for name, values in self._episode(outputs.steps).items()}
+                episode = {name: _where(ended, values) for name, values in self._episode(outputs).items()}
                 infos |= _marked({"episode": episode}, ended, ended)
         self._began[ended if same_step else began] = perf_counter()
-        return self._shaped(outputs.observations), outputs.rewards, outputs.terminated, outputs.truncated, infos
+        told = outputs.told
+        rewards = told.rewards.T if told is not None and self.scenario.apart else outputs.rewards
+        return self._shaped(outputs.observations), rewards, outputs.terminated, outputs.truncated, infos
 
     def action_masks(self) -> np.ndarray:
         """Which meta-actions would pass the coming decision without a proper response, `[E, A]` bool.
@@ -168,7 +176,7 @@ class FastVectorEnv(VectorEnv):
         """
         if self.settings is None:
             raise ValueError("action_masks with shield = None: expected shield = 'override' or 'monitor'")
-        if not len(self.scenario.labels):
+        if not len(self.scenario.labels) or self.scenario.agents is not None:
             kind = type(self.scenario.stock.action_type).__name__
             raise ValueError(f"action_masks: expected DiscreteMetaAction, not {kind}")
         return self.engine.action_masks()
@@ -202,8 +210,8 @@ class FastVectorEnv(VectorEnv):
             self._painter.close()
 
     def _finals(self, outputs: Outputs, ended, actions, proposed) -> dict:
-        finals = self._told(outputs.final_steps, outputs.final_risks, ended, actions, proposed)
-        finals["episode"] = self._episode(outputs.final_steps)
+        finals = self._told(outputs, ended, actions, proposed, final=True)
+        finals["episode"] = self._episode(outputs, final=True)
         return {
             "final_obs": self._shaped(outputs.final_observations),
             "_final_obs": ended,
@@ -211,31 +219,41 @@ class FastVectorEnv(VectorEnv):
             "_final_info": ended,
         }
 
-    def _told(self, steps, risks, decided, actions=None, proposed=None) -> dict:
-        """Infos, with the actions where one was decided upon."""
-        infos = step_infos(steps, self.scenario, self.settings, risks)
+    def _told(self, outputs: Outputs, decided, actions=None, proposed=None, final=False) -> dict:
+        """Infos, with the actions where one was decided upon; final: of the last decision of episodes that ended."""
+        steps, risks = (outputs.final_steps, outputs.final_risks) if final else (outputs.steps, outputs.risks)
+        agents = _agents_of(outputs, final)
+        infos = step_infos(steps, self.scenario, self.settings, risks, agents)
         if actions is None:
-            actions = proposed = np.zeros(self.action_space.shape, self.action_space.dtype)
+            actions = proposed = create_empty_array(self.single_action_space, self.num_envs)
         infos["action"] = _where(decided, actions)
-        if self.settings is not None:
-            executed = self._executed(steps, actions)
-            infos["shield"] |= {
-                "proposed_action": _where(decided, proposed),
-                "executed_action": _where(decided, executed),
-                "action_replaced": decided & (_rows(actions) != _rows(proposed)).any(axis=1),
-            }
+        if self.settings is not None and agents is None:
+            infos["shield"] |= self._chosen(steps, decided, actions, proposed)
+        elif self.settings is not None and agents is not None:
+            for a, info in enumerate(infos["agents"]):
+                info["shield"] |= self._chosen(agents.steps[a], decided, actions[a], proposed[a])
         return infos
 
+    def _chosen(self, steps, decided, actions, proposed) -> dict:
+        """What one agent proposed, and what came of it."""
+        return {
+            "proposed_action": _where(decided, proposed),
+            "executed_action": _where(decided, self._executed(steps, actions)),
+            "action_replaced": decided & (_rows(actions) != _rows(proposed)).any(axis=1),
+        }
+
     def _executed(self, steps, actions) -> np.ndarray:
-        kind, commands = self.scenario.stock.action_type, np.full((len(steps), 2), np.nan)
+        kind, commands = self.scenario.kind, np.full((len(steps), 2), np.nan)
         if not isinstance(kind, DiscreteMetaAction):  # of which nobody asks for commands
             np.divide(steps["acceleration"], steps["frames"], out=commands[:, 0], where=steps["frames"] > 0)
             np.divide(steps["steering"], steps["frames"], out=commands[:, 1], where=steps["frames"] > 0)
         return executed_actions(kind, actions, steps["lane_change_refused"], commands)
 
-    def _episode(self, steps: np.ndarray) -> dict:
+    def _episode(self, outputs: Outputs, final=False) -> dict:
         lasted = np.round(perf_counter() - self._began, 6)
-        return {"r": steps["episode_return"], "l": steps["episode_length"], "t": lasted}
+        steps, agents = outputs.final_steps if final else outputs.steps, _agents_of(outputs, final)
+        returns = agents.steps["episode_return"].T if agents and self.scenario.apart else steps["episode_return"]
+        return {"r": returns, "l": steps["episode_length"], "t": lasted}
 
     def _seeds(self, seed) -> list[int | None]:
         if seed is None:
@@ -250,7 +268,24 @@ class FastVectorEnv(VectorEnv):
             raise ValueError(f"{len(seed)} seeds given; expected {self.num_envs}")
         return [seed_of(one) for one in seed]
 
-    def _commands(self, actions: np.ndarray):
+    def _of_each(self, actions) -> tuple[np.ndarray, ...]:
+        """The actions of several agents, one after the other."""
+        count = self.scenario.agents
+        if not isinstance(actions, tuple | list | np.ndarray) or len(actions) != count:
+            raise ValueError(f"actions = {actions}: expected a tuple with those of each of {count} agents")
+        return tuple(np.asarray(one) for one in actions)
+
+    def _commands(self, actions):
+        """Discrete actions and commands as `Engine.step` takes them."""
+        if self.scenario.agents is None:
+            return self._commands_of(actions, self.action_space)
+        own: Any = self.action_space
+        each = [self._commands_of(asked, space) for asked, space in zip(actions, own.spaces, strict=True)]
+        discrete, commands = zip(*each, strict=True)
+        return np.stack(discrete), None if commands[0] is None else np.stack(commands)
+
+    def _commands_of(self, actions: np.ndarray, space: spaces.Space):
+        """Likewise, of one agent with the batched `space`."""
         if actions.ndim == 0 or len(actions) != self.num_envs:
             given = f"actions = {actions}" if actions.ndim == 0 else f"{len(actions)} actions given"
             raise ValueError(f"{given}; expected {self.num_envs}")
@@ -261,8 +296,8 @@ class FastVectorEnv(VectorEnv):
                 raise ValueError(f"actions = {actions}: expected integers from 0 to {count - 1}")
             return actions.astype(np.int64), None if choices is None else choices[actions]
         numbers = np.issubdtype(actions.dtype, np.number) and np.isfinite(actions).all()
-        if actions.shape != self.action_space.shape or not numbers:
-            raise ValueError(f"actions = {actions}: expected finite numbers, shape {self.action_space.shape}")
+        if actions.shape != space.shape or not numbers:
+            raise ValueError(f"actions = {actions}: expected finite numbers, shape {space.shape}")
         return _compared(actions), self.scenario.commands(actions)
 
     def _shaped(self, observations: np.ndarray) -> Any:
@@ -287,8 +322,18 @@ def _rows(actions: np.ndarray) -> np.ndarray:
     return actions.reshape(len(actions), -1)
 
 
-def _where(decided: np.ndarray, actions: np.ndarray) -> np.ndarray:
-    """Actions `[E, ...]` where one was decided upon, else 0."""
+def _agents_of(outputs: Outputs, final: bool) -> Agents | None:
+    """What is said of each of several egos."""
+    told = outputs.told
+    if told is None:
+        return None
+    return Agents(told.final_steps, told.final_risks) if final else Agents(told.steps, told.risks)
+
+
+def _where(decided: np.ndarray, actions: Any) -> Any:
+    """Actions `[E, ...]` where one was decided upon, else 0; of several agents a tuple of them."""
+    if isinstance(actions, tuple):
+        return tuple(_where(decided, one) for one in actions)
     return np.where(decided.reshape(-1, *[1] * (actions.ndim - 1)), actions, actions.dtype.type(0))
 
 
@@ -299,14 +344,17 @@ def _marked(infos: dict, where: np.ndarray, decided: np.ndarray) -> dict:
         valid = decided if name in _OF_DECISIONS else where
         if valid is decided and not decided.any():
             continue
+        if isinstance(values, tuple) and isinstance(values[0], dict):
+            values = tuple(_marked(one, where, decided) for one in values)
         marked[name] = _marked(values, where, decided) if isinstance(values, dict) else values
         marked["_" + name] = valid
     return marked
 
 
 def _without(info: dict, names: tuple[str, ...]) -> dict:
-    return {
-        name: _without(value, names) if isinstance(value, dict) else value
-        for name, value in info.items()
-        if name not in names
-    }
+    def less(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(map(less, value))
+        return _without(value, names) if isinstance(value, dict) else value
+
+    return {name: less(value) for name, value in info.items() if name not in names}

@@ -12,7 +12,7 @@ from rss_shield.envs.highway.ego import Frame
 from rss_shield.envs.highway.egos import EgoShields
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of
 from rss_shield.envs.highway.wrapper import traffic_info
-from rss_shield.envs.options import Given, Params, check_action_type, check_kind
+from rss_shield.envs.options import Given, Options, Params, check_action_type, check_kind
 from rss_shield.envs.sensing import Sensing
 from rss_shield.envs.stock import check_frequencies
 from rss_shield.shield.lanes.judge import Audit
@@ -91,8 +91,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
 
     def _check(self) -> None:
         check_agents(self.env.unwrapped)
-        if self.options.replace != "frame":
-            raise ValueError(f"replace = {self.options.replace!r}: expected 'frame' for several agents")
+        check_replace_of_agents(self.options)
         sensing = Sensing.of(self.options.sensing)
         if sensing is not None and sensing.agent:
             raise ValueError("sensing.agent = True: expected False for several agents")
@@ -121,6 +120,12 @@ def outcome_of_agents(env: Any, actions: tuple) -> tuple[list[float], list[bool]
 def has_agents(env: Any) -> bool:
     """Does an environment take one action for each of several agents?"""
     return isinstance(getattr(env, "action_type", None), MultiAgentAction)
+
+
+def check_replace_of_agents(options: Options) -> None:
+    """Is nothing asked for that one agent's shield does with the action of a decision?"""
+    if options.replace != "frame":
+        raise ValueError(f"replace = {options.replace!r}: expected 'frame' for several agents")
 
 
 def check_agents(env: Any) -> None:

@@ -9,7 +9,7 @@ import rss_shield
 from rss_shield.envs.fast.config import compile_scenario
 from rss_shield.envs.fast.draws import generator_state
 from rss_shield.envs.fast.engine import DISABLED, Engine
-from rss_shield.envs.fast.infos import step_infos
+from rss_shield.envs.fast.infos import Agents, step_infos
 from rss_shield.envs.fast.state import OBSTACLE, TRAFFIC
 from rss_shield.envs.fast.vector import _compared
 from rss_shield.envs.stock import drivers_unchanged
@@ -33,7 +33,9 @@ class Comparison(NamedTuple):
 
 
 def actions_of(policy: str, space, rng):
-    """Next action of a policy."""
+    """Next action of a policy, of several agents a tuple."""
+    if isinstance(space, spaces.Tuple):
+        return tuple(actions_of(policy, one, rng) for one in space)
     if isinstance(space, spaces.Box):
         throttle = {"random": rng.uniform(-1, 1), "faster": 1.0, "slower": -1.0}[policy]
         action = rng.uniform(-1, 1, space.shape) * (0.1 if policy != "random" else 1.0)
@@ -81,11 +83,15 @@ def _compare(env_id, seeds, policy, config, shield, max_steps, until, options) -
             here = f"{where} step {step}"
             _compare_state(stock.unwrapped, engine, here, worst, discrete)
             _compare_observation(seen, out, worst)
-            worst["reward"] = max(worst["reward"], abs(reward - out.rewards[0]))
+            rewarded = out.told.rewards[:, 0] if isinstance(reward, tuple) else out.rewards[0]
+            worst["reward"] = max(worst["reward"], np.max(np.abs(np.subtract(reward, rewarded))))
+            if isinstance(terminated, tuple):  # agent by agent
+                terminated = bool(stock.unwrapped._is_terminated())
             if (terminated, truncated) != (out.terminated[0], out.truncated[0]):
                 discrete.append(f"{here}: ends {terminated, truncated}, {out.terminated[0], out.truncated[0]}")
             if shield:
-                _compare_info(info, step_infos(out.steps, engine.scenario, settings), here, discrete)
+                agents = Agents(out.told.steps, None) if out.told is not None else None
+                _compare_info(info, step_infos(out.steps, engine.scenario, settings, None, agents), here, discrete)
             if terminated or truncated or len(discrete) > before:
                 break
         episodes += 1
@@ -102,6 +108,14 @@ def _compare(env_id, seeds, policy, config, shield, max_steps, until, options) -
 def engine_inputs(engine, action):
     """What one action of the stock environment is for an engine of one environment."""
     scenario = engine.scenario
+    if scenario.agents is not None:
+        each = [_inputs_of(scenario, one) for one in action]
+        return np.stack([one for one, _ in each]), None if each[0][1] is None else np.stack([two for _, two in each])
+    return _inputs_of(scenario, action)
+
+
+def _inputs_of(scenario, action):
+    """Of one agent."""
     if len(scenario.labels):
         return np.array([action]), None
     if scenario.choices is not None:
@@ -167,10 +181,19 @@ def _compare_observation(seen, out, worst) -> None:
 
 def _compare_info(info, infos, where, discrete) -> None:
     ours = info_at(infos, 0)
+    if "agents" in ours:
+        for a, (theirs, own) in enumerate(zip(info["agents"], ours.pop("agents"), strict=True)):
+            _compare_one(theirs, own, f"{where} agent {a}", discrete)
+    _compare_one(info, ours, where, discrete)
+
+
+def _compare_one(info, ours, where, discrete) -> None:
     theirs = {key: info[key] for key in ours}
-    theirs["shield"] = {key: info["shield"][key] for key in ours["shield"]}
-    margins = [max(i["shield"]["min_margin_lon"], i["shield"]["min_margin_lat"]) for i in (ours, theirs)]
-    tie = margins[0] == margins[1] or abs(margins[0] - margins[1]) < 1e-8
+    tie = False
+    if "shield" in ours:
+        theirs["shield"] = {key: info["shield"][key] for key in ours["shield"]}
+        margins = [max(i["shield"]["min_margin_lon"], i["shield"]["min_margin_lat"]) for i in (ours, theirs)]
+        tie = margins[0] == margins[1] or abs(margins[0] - margins[1]) < 1e-8
     for name, (a, b) in _flat(theirs, ours):
         if tie and name in _NEAREST:
             continue  # two users equally near to danger: the last bit decides who is reported

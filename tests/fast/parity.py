@@ -1,9 +1,10 @@
 """Parity of the engine with highway-env at length, one row per case.
 
     python tests/fast/parity.py --episodes 100
+    python tests/fast/parity.py --episodes 20 --envs intersection-multi-agent-v0 --shield none override monitor
     NPY_DISABLE_CPU_FEATURES=X86_V4 python tests/fast/parity.py --episodes 100
 
-The second form takes numpy's AVX-512 functions, which differ from the C library's by one unit in the
+The last form takes numpy's AVX-512 functions, which differ from the C library's by one unit in the
 last place, from both. Every episode is equal to the last bit with either.
 """
 
@@ -30,7 +31,7 @@ BARE = (
     "intersection-v2",
     "highway-v0",
 )
-SHIELDED = tuple(env_id for env_id in BARE if env_id != "highway-v0")
+TOO_SLOW = ("highway-v0",)  # behind the shield on highway-env
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
 
 
@@ -48,7 +49,7 @@ def main() -> int:
     equal = True
     for env_id in arguments.envs:
         for mode in arguments.shield:
-            if mode != "none" and env_id not in SHIELDED:
+            if mode != "none" and env_id in TOO_SLOW:
                 continue
             for policy in arguments.policies:
                 equal &= _row(env_id, mode, policy, arguments)

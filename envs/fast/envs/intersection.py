@@ -1,4 +1,7 @@
-"""`intersection-v0/-v2`: four arms, traffic that comes and goes, and yields; random numbers in highway-env's order."""
+"""`intersection-v0/-v2` and several agents there: four arms, traffic that comes and goes, and yields.
+
+Random numbers are drawn in highway-env's order.
+"""
 
 from typing import Any
 
@@ -12,6 +15,7 @@ from rss_shield.envs.fast.rating import normalized, scaled, weigh
 from rss_shield.envs.fast.record import FLOW, Unsupported, set_scale, set_weights
 from rss_shield.envs.fast.sight import sort_along_x
 from rss_shield.envs.fast.spawning import add_ego, add_on_lane
+from rss_shield.envs.fast.state import TRAFFIC
 from rss_shield.envs.roads.network import heading_at, local_coordinates, position
 from rss_shield.envs.stock import AT_INTERSECTIONS
 from rss_shield.shield._numba.compiled import inner, part
@@ -58,7 +62,8 @@ def flow_of(dt: float, given: dict, env: Any, number: dict) -> np.ndarray:
 def room_for(record: Any, given: dict) -> int:
     """As many road users as can appear in an episode, at most `MOST_CARS`."""
     decisions = record["duration"][0] / record["period"][0] + 2
-    return int(min(MOST_CARS, max(given["initial_vehicle_count"], 1) + 1 + np.ceil(decisions)))
+    agents = record["agents"][0]
+    return int(min(MOST_CARS, max(given["initial_vehicle_count"], 1) + agents + np.ceil(decisions)))
 
 
 @inner
@@ -66,6 +71,16 @@ def has_arrived(cars, i, lanes, sight):
     """Has a car left the intersection?"""
     k = cars[i].lane
     return lanes[k].exits and sight.s[k, i] >= _EXIT_DISTANCE
+
+
+@inner
+def is_over(cars, egos, lanes, sight):
+    """Has one of several agents crashed, or have all arrived? egos: `[A]` EPISODE."""
+    crashed, arrived = False, True
+    for a in range(len(egos)):
+        crashed = crashed or cars[egos[a].ego].crashed
+        arrived = arrived and has_arrived(cars, egos[a].ego, lanes, sight)
+    return crashed or arrived
 
 
 @inner
@@ -82,7 +97,7 @@ def rate(cars, episode, ego, on_road, lanes, sight, config, step):
 
 @part
 def open_intersection(cars, episode, order, net, sight, config, flow, target_speeds, linear):
-    """Populate the roads, let the traffic run for three seconds, then add the ego.
+    """Populate the roads, let the traffic run for three seconds, then add the egos.
 
     Args:
       cars: `[N]` CAR, overwritten.
@@ -109,7 +124,11 @@ def open_intersection(cars, episode, order, net, sight, config, flow, target_spe
         think(cars, episode, 0, episode.vehicles, changing, net, sight, config)
         act(cars, episode, order, net, sight, config, flow)
     _arrive(cars, episode, 60.0, 0.1, 0.0, 1.0, _STRAIGHT_ON, net, config, flow[0], linear)
-    _add_ego_on_its_way(cars, episode, net, config, flow[0], target_speeds)
+    for k in range(config.agents):
+        _add_ego_on_its_way(k, cars, episode, net, config, flow[0], target_speeds)
+    episode.ego = 0
+    while episode.ego < episode.cars - 1 and cars[episode.ego].kind == TRAFFIC:
+        episode.ego += 1
     _renumber(cars, episode, order)
     episode.observed_lanes = lanes[cars[episode.ego].lane].siblings
 
@@ -122,7 +141,7 @@ def let_traffic_flow(cars, episode, order, net, config, flow, linear):
     i = 0
     while i < episode.cars:
         lane = net.lanes[cars[i].lane]
-        if i != episode.ego and lane.exits and _arc_length(lane, cars[i]) >= lane.length - _LEAVING:
+        if cars[i].kind == TRAFFIC and lane.exits and _arc_length(lane, cars[i]) >= lane.length - _LEAVING:
             _remove(cars, episode, i)
         else:
             i += 1
@@ -160,12 +179,12 @@ def _arrive(cars, episode, s, deviation, speed_deviation, probability, bound, ne
 
 
 @part
-def _add_ego_on_its_way(cars, episode, net, config, flow, target_speeds):
-    """Put the ego on the southern entry and clear its surroundings."""
+def _add_ego_on_its_way(k, cars, episode, net, config, flow, target_speeds):
+    """Put an ego on entry `k`, the first one on the southern, and clear its surroundings of traffic."""
     destination = flow.destination
     if destination < 0:
         destination = 1 + integers(episode, 3)
-    lane = net.lanes[config.main_lane]
+    lane = net.lanes[config.main_lane + k % 4 * flow.arm]
     x, y = position(lane, 60.0 + 5.0 * (1.0 + normal(episode)), 0.0)
     if _is_full(cars, episode):
         return
@@ -174,7 +193,7 @@ def _add_ego_on_its_way(cars, episode, net, config, flow, target_speeds):
         cars[ego].route = net.plans[cars[ego].lane, destination]
     i = 0
     while i < episode.ego:
-        if norm(cars[i].x - x, cars[i].y - y) < _EGO_CLEARANCE:
+        if cars[i].kind == TRAFFIC and norm(cars[i].x - x, cars[i].y - y) < _EGO_CLEARANCE:
             _remove(cars, episode, i)
         else:
             i += 1

@@ -21,6 +21,7 @@ class Glance(NamedTuple):
     view: View
     start: int
     size: int
+    agent: int = 0  # of several, who sees it
 
 
 def views_of(env: Any, net: Network) -> tuple[View, tuple[Glance, ...]]:
@@ -37,9 +38,10 @@ def views_of(env: Any, net: Network) -> tuple[View, tuple[Glance, ...]]:
             return view, ()
         return empty_view(NONE), (Glance(view, 0, _size(seen)),)
     glances: list[Glance] = []
-    for part, options in several:
+    each = type(seen) is stock.MultiAgentObservation
+    for agent, (part, options) in enumerate(several):
         start = glances[-1].start + glances[-1].size if glances else 0
-        glances.append(Glance(_describe(part, options, env, net), start, _size(part)))
+        glances.append(Glance(_describe(part, options, env, net), start, _size(part), agent if each else 0))
     return empty_view(NONE), tuple(glances)
 
 

@@ -20,7 +20,8 @@ def describe(times: int, env: Any, net: Network) -> View:
     network = env.road.network
     view = empty_view(TIME_TO_COLLISION)
     record = view.record
-    record["speeds"], record["times"] = len(env.action_type.target_speeds), times
+    kind = getattr(env.action_type, "agents_action_types", [env.action_type])[0]
+    record["speeds"], record["times"] = len(kind.target_speeds), times
     record["lanes"] = max(len(network.all_side_lanes(index)) for index in network.lanes_dict())
     meets, left = _meetings(network, net, bool(env.vehicle.route))
     return view._replace(meets=meets, left=left)
