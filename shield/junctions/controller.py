@@ -173,6 +173,8 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         if trapped:
             a = _least_harm(scene, a, len(samples))
         plan.held_at = a if a < limited else np.inf
+    else:
+        trapped = _is_trapped(scene, plan)
     pairs = broken = 0
     for i in range(len(samples)):
         known = clear and (which <= TABLE or not is_left_out(scene, i))
@@ -354,6 +356,24 @@ def _choose(scene, plan, a, at_line, holds):
         plan.go = max(plan.go - 1, 0)
         return (go_now if goes else brake), True, False
     return _escape(scene, plan, go_now, brake)
+
+
+@apart
+def _is_trapped(scene, plan):
+    """Would the shield have no plan now that stays clear of everybody, if it were on? It only watches.
+
+    As in `_choose` and `_escape`; `plan` is the one that would be in force then.
+    """
+    brake = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt)
+    if stop_conflict(scene, brake, EVERYBODY, ANYWHERE, 0.0) == NEVER:
+        plan.go = 0
+        return False
+    if plan.go >= 0 and plan_conflict(scene, plan.go, EVERYBODY, 0.0) == NEVER:
+        plan.go = max(plan.go - 1, 0)
+        return False
+    go_now = throttle(scene, scene.track.s, scene.track.v)
+    plan.go = go_plan(scene, go_now, EVERYBODY, ANYWHERE, 0.0)[0]
+    return plan.go < 0
 
 
 @inner
