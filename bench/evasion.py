@@ -4,7 +4,9 @@
     python bench/evasion.py --write               ... and writes docs/results/evasion.md
 
 Every kind of episode is a file in runs/evasion, and is not played again. The agent's actions depend on the episode's
-seed alone, so both runs of a pair differ by nothing but the option until the first manoeuvre.
+seed alone, so both runs of a pair differ by nothing but the option until the first manoeuvre. What becomes of a pair
+after that is partly chance: so it is played a third time, with the shield alone and one other action of the agent at
+the decision in which the manoeuvre begins.
 """
 
 import dataclasses
@@ -15,22 +17,27 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import tyro
+from gymnasium.vector import AutoresetMode
 
+from rss_shield.envs.make_vec import make_vec
 from rss_shield.envs.roads.hostile import HOSTILE
 from rss_shield.eval.files import write_json, write_text
 from rss_shield.eval.pages import markdown, spaced
-from rss_shield.eval.rollout import NO_CONTACT
+from rss_shield.eval.rollout import NO_CONTACT, evaluate
 from rss_shield.eval.stats import clopper_pearson
+from rss_shield.eval.suite.policies import Scripted
 from rss_shield.eval.suite.scenarios.catalogue import FOREVER, LEFT, MIDDLE, RIGHT, ahead, behind, ego
 from rss_shield.eval.suite.scenarios.stage import Car, Scenario
 from rss_shield.eval.suite.scenarios.stage import play as stage
-from rss_shield.eval.suite.scripted import play
+from rss_shield.eval.suite.setup import setup_of
 from rss_shield.shield.verdicts import AT_FAULT
 
 PAGE = Path("docs/results/evasion.md")
 FIRST_SEED = 3_000_000
 ROADS = ("highway-fast-v0", "merge-v0", "exit-v0", "two-way-v0")
 POLICIES = ("random", "faster", "idle")
+SIDE_BY_SIDE = 256  # episodes in the engine
+ACTIONS = 5  # of meta-actions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,17 +90,104 @@ def offences_of(kind: str, count: int) -> dict[str, Any]:
     return {"offence": kind, "pairs": pairs, "broken": broken}
 
 
+class Followed:
+    """A batch of the engine that remembers where each ego was after every decision.
+
+    Args:
+      env: `FastVectorEnv` without autoreset, one episode each.
+    """
+
+    def __init__(self, env: Any) -> None:
+        self.env, self.paths = env, []  # type: Any, list[np.ndarray]
+
+    def reset(self, *, seed: Any = None, options: dict | None = None) -> Any:
+        """Begin the episodes."""
+        return self.env.reset(seed=seed, options=options)
+
+    def step(self, actions: np.ndarray) -> Any:
+        """One decision."""
+        result = self.env.step(actions)
+        cars, egos = self.env.engine.batch.cars, self.env.engine.batch.episodes["ego"]
+        own = cars[np.arange(len(cars)), egos]
+        self.paths.append(np.stack([own["x"], own["y"], own["speed"]], axis=-1))
+        return result
+
+    def close(self) -> None:
+        """Close the batch."""
+        self.env.close()
+
+    def columns(self, e: int) -> dict[str, Any]:
+        """Of environment `e`, whose episode has just ended: `path`, `[decisions, 3]`."""
+        return {"path": np.array([one[e] for one in self.paths])}
+
+
+def play(
+    road: str, policy: str, options: dict[str, Any], seeds: Any, other: dict[int, tuple[int, int]]
+) -> pd.DataFrame:
+    """Episodes side by side, with their paths.
+
+    Args:
+      other: of some seeds, a decision and by how much the number of its action is shifted.
+    """
+    arguments = setup_of(road, options)
+    arguments.pop("backend")
+    frames = []
+    for first in range(0, len(seeds), SIDE_BY_SIDE):
+        chunk = seeds[first : first + SIDE_BY_SIDE]
+        env = make_vec(road, len(chunk), autoreset_mode=AutoresetMode.DISABLED, **arguments)
+        batch, space = Followed(env), env.single_action_space
+        each = [Scripted(policy, space, int(seed)) for seed in chunk]
+
+        def act(seen: Any, batch=batch, space=space, each=each, chunk=chunk) -> np.ndarray:
+            actions = np.array([act() for act in each])
+            for e, seed in enumerate(chunk):
+                decision, shift = other.get(int(seed), (-1, 0))
+                if decision == len(batch.paths):
+                    actions[e] = (actions[e] + shift) % space.n
+            return actions
+
+        made = lambda n, batch=batch: batch  # noqa: E731
+        more = lambda env, e: env.columns(e)  # noqa: E731
+        frames.append(evaluate(made, act, chunk, n_envs=len(chunk), keep_actions=False, more=more))
+    return pd.concat(frames, ignore_index=True)
+
+
+def parts_at(one: np.ndarray, other: np.ndarray) -> int:
+    """First decision after which two paths differ, -1 = none."""
+    both = min(len(one), len(other))
+    differ = np.flatnonzero((one[:both] != other[:both]).any(axis=1))
+    return int(differ[0]) if len(differ) else -1 if len(one) == len(other) else both
+
+
 def pairs_of(road: str, policy: str, traffic: str, episodes: int) -> dict[str, Any]:
-    """Counts of verdicts by pair: how often the shield alone came to the first and evasion to the second."""
-    seeds = range(FIRST_SEED, FIRST_SEED + episodes)
-    alone, evading = (play(road, policy, {"others": traffic, "evasion": on}, seeds) for on in (False, True))
+    """Counts of verdicts by pair: how often the shield alone came to the first and evasion to the second.
+
+    "chance" counts those pairs in which a manoeuvre made a difference and another action does so as well: the verdicts
+    with the shield alone, with evasion, and with the other action.
+    """
+    seeds = np.arange(FIRST_SEED, FIRST_SEED + episodes)
+    alone, evading = (play(road, policy, {"others": traffic, "evasion": on}, seeds, {}) for on in (False, True))
+    parts = np.array([parts_at(one, two) for one, two in zip(alone["path"], evading["path"], strict=True)])
+    chance: list[tuple[str, str, str]] = []
+    left, rng = np.flatnonzero(parts >= 0), np.random.default_rng([FIRST_SEED, episodes])
+    for shift in rng.permutation(np.arange(1, ACTIONS)).tolist():
+        if len(left) == 0:
+            break
+        swapped = {int(seeds[i]): (int(parts[i]), shift) for i in left}
+        other = play(road, policy, {"others": traffic, "evasion": False}, seeds[left], swapped)
+        for i, blame, path in zip(left.tolist(), other["blame"], other["path"], strict=True):
+            if parts_at(alone["path"][i], path) >= 0:
+                chance.append((alone["blame"][i], evading["blame"][i], blame))
+                parts[i] = -1
+        left = np.flatnonzero(parts >= 0)
     verdicts = pd.DataFrame({"alone": alone["blame"], "evading": evading["blame"]})
-    counts = verdicts.value_counts().reset_index()
+    by_chance = pd.DataFrame(chance, columns=["alone", "evading", "other"])
     return {
         "road": road,
         "policy": policy,
         "traffic": traffic,
-        "pairs": [[a, b, int(n)] for a, b, n in counts.itertuples(index=False)],
+        "pairs": [[*kinds, int(n)] for kinds, n in verdicts.value_counts().items()],
+        "chance": [[*kinds, int(n)] for kinds, n in by_chance.value_counts().items()],
         "broken": int(evading["broken_duties"].sum()),
     }
 
@@ -127,24 +221,42 @@ def row(name: str, results: list[dict[str, Any]]) -> list[str]:
     ]
 
 
+def chance_row(name: str, results: list[dict[str, Any]]) -> list[str]:
+    """One row of the table that compares manoeuvres with another action."""
+    cells = [name]
+    counts = [(a != NO_CONTACT, b != NO_CONTACT, c != NO_CONTACT, n) for one in results for a, b, c, n in one["chance"]]
+    for had in (True, False):
+        of = sum(n for a, _, _, n in counts if a == had)
+        for which in (1, 2):
+            k = sum(one[3] for one in counts if one[0] == had and one[which] != had)
+            share = clopper_pearson(k, of) if of else None
+            cells.append(f"{k} of {of} ({share.value:.0%} [{share.low:.0%}, {share.high:.0%}])" if share else "-")
+    return cells
+
+
+CHANCE_HEADER = (
+    *("contacts avoided by a manoeuvre", "by another action", "new contacts by a manoeuvre", "by another action"),
+)
 HEADER = (
     *("episodes", "contacts, shield alone", "of these avoided [95 %]", "new ones, of the others [95 %]"),
     "ego at fault, or nobody",
 )
 
 
+def traffics(results: list[dict[str, Any]]) -> list[str]:
+    """Kinds of drivers among which a manoeuvre made a difference."""
+    return sorted({one["traffic"] for one in results if one["chance"]})
+
+
 def page_of(results: list[dict[str, Any]], scripted: list[dict[str, Any]]) -> str:
     """The page of results, of episodes in the engine and of scripted offences."""
     sections = [
         "# Evasion",
-        "Written by `python bench/evasion.py --write`. The same episodes twice, with the shield "
-        "alone and with `evasion=True` (Defs. 11-13): ordinary and hostile traffic, an agent whose actions depend on "
-        "the "
-        "seed alone. A pair is the same until the first manoeuvre; from then on everybody else reacts to another "
-        "ego, so "
-        "a contact that is *new* may be of an episode that would have ended before, or with somebody who would not "
-        "have "
-        "been met. Intervals are exact (Clopper-Pearson).",
+        "Written by `python bench/evasion.py --write`. The same episodes twice, with the shield alone and with "
+        "`evasion=True` (Defs. 11-13): ordinary and hostile traffic, an agent whose actions depend on the seed alone. "
+        "A pair is the same until the first manoeuvre; from then on everybody else reacts to another ego. *Avoided*: "
+        "there was a contact with the shield alone, and none with evasion; *new*: the other way round. Intervals are "
+        "exact (Clopper-Pearson).",
         f"The ego broke {sum(one['broken'] for one in results)} duties while it evaded.",
     ]
     if scripted:
@@ -163,6 +275,16 @@ def page_of(results: list[dict[str, Any]], scripted: list[dict[str, Any]]) -> st
             "elsewhere. How "
             "many are new then is in the tables below."
         ]
+    rows = [chance_row(name, [one for one in results if one["traffic"] == name]) for name in traffics(results)]
+    sections += [
+        "## How much of that is chance",
+        "Hostile drivers aim at the ego all the time, so whatever changes its path changes which attack succeeds. "
+        "Those pairs in which a manoeuvre made a difference were played once more, with the shield alone and *another "
+        "action* of the agent at the decision in which the manoeuvre begins; counted are those in which that makes a "
+        "difference, too. As often as a harmless change brings a contact that would not have been, or spares one, that "
+        "is chance and not the manoeuvre's doing.",
+        markdown([["traffic", *CHANCE_HEADER], *rows, chance_row("all", results)]),
+    ]
     for title, key in (("By road", "road"), ("By traffic", "traffic"), ("By policy", "policy")):
         groups = sorted({one[key] for one in results})
         rows = [row(name, [one for one in results if one[key] == name]) for name in groups]

@@ -312,7 +312,9 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     wish = Command(acceleration, slip)
     response = Response(wish, False, False, False)
     if settings.overrides:
-        body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack, car.kind == DIRECT)
+        body = Body(
+            car.length / 2, watch.max_slip, bend.curvature, bend.slack, bend.turned, bend.idle, car.kind == DIRECT
+        )
         if others_act:
             response = _answer(wish, car, danger, episode, sight, distances, body, settings, step)
         else:

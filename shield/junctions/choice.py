@@ -48,6 +48,24 @@ def choose(scene, plan, a, at_line, holds):
     return _escape(scene, plan, go_now, brake)
 
 
+@apart
+def is_trapped(scene, plan):
+    """Would the shield have no plan now that stays clear of everybody, if it were on? It only watches.
+
+    As in `choose` and `_escape`; `plan` is the one that would be in force then.
+    """
+    brake = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt)
+    if stop_conflict(scene, brake, EVERYBODY, ANYWHERE, 0.0) == NEVER:
+        plan.go = 0
+        return False
+    if plan.go >= 0 and plan_conflict(scene, plan.go, EVERYBODY, 0.0) == NEVER:
+        plan.go = max(plan.go - 1, 0)
+        return False
+    go_now = throttle(scene, scene.track.s, scene.track.v)
+    plan.go = go_plan(scene, go_now, EVERYBODY, ANYWHERE, 0.0)[0]
+    return plan.go < 0
+
+
 @inner
 def ease(scene, plan, memory, wish, at_line, rate):
     """The smoothest acceleration toward a wish that leaves a plan, see `shield.junctions.easing`.

@@ -13,7 +13,7 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import apart, inner
 from rss_shield.shield.definitions.kinematics import time_to_collision
-from rss_shield.shield.junctions.choice import choose, ease, least_harm
+from rss_shield.shield.junctions.choice import choose, ease, is_trapped, least_harm
 from rss_shield.shield.junctions.examined import TABLE, count_examined, examine, is_left_out
 from rss_shield.shield.junctions.followers import find_those_behind, is_behind, sort_out
 from rss_shield.shield.junctions.judge import judge_user, note_who_trapped
@@ -79,6 +79,8 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         if trapped:
             a = least_harm(scene, a, len(samples))
         plan.held_at = a if a < limited else np.inf
+    else:
+        trapped = is_trapped(scene, plan)
     pairs = broken = 0
     for i in range(len(samples)):
         known = clear and (which <= TABLE or not is_left_out(scene, i))

@@ -35,6 +35,7 @@ HORIZON = 4.0  # that manoeuvres are followed for [s]
 STEP = 0.1  # between two looks on the way [s]
 _STRAIGHT, _ASIDE = 4, 4  # brakings, and accelerating; as many with a swerve, going on instead of accelerating
 _SWERVES = 3
+_LANE = 4.0  # [m]
 FAMILY = _STRAIGHT + _ASIDE * _SWERVES * 2  # how many manoeuvres there are
 _MOST_AT_ONCE = 60  # of road users in danger with the ego that are told apart
 
@@ -55,11 +56,12 @@ class Effort(NamedTuple):
 
 
 @compiled
-def manoeuvre(k, driver):
+def manoeuvre(k, driver, first=-1.0):
     """Manoeuvre `k` of the family, gentle ones first: `FAMILY` plans.
 
     Straight on with `a_min_brake`, halfway, `a_max_brake`, `a_max_accel`; then moving over by 1 m (within the lane),
-    2 m and 4 m (to the next one) to either side, at the same speed and with each of the brakings.
+    2 m and 4 m (to the next one) to either side, at the same speed and with each of the brakings. `first`: the side
+    that comes first, -1 = left.
     """
     middle = 0.5 * (driver.a_min_brake + driver.a_max_brake)
     if k < _STRAIGHT:
@@ -67,7 +69,7 @@ def manoeuvre(k, driver):
             return Plan(driver.a_max_accel, 0.0, 0.0)
         return Plan(-(driver.a_min_brake if k == 0 else middle if k == 1 else driver.a_max_brake), 0.0, 0.0)
     k -= _STRAIGHT
-    side, far, braking = 2 * (k % 2) - 1, (k // 2) % _SWERVES, k // (2 * _SWERVES)
+    side, far, braking = (1 - 2 * (k % 2)) * first, (k // 2) % _SWERVES, k // (2 * _SWERVES)
     a_lat = driver.a_lat_max_accel
     swerve = np.sqrt(2.0**far / max(a_lat, 1e-9))  # moves over by a_lat swerve^2
     a = 0.0
@@ -103,8 +105,9 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
         return Effort(wish, False, False)
     if offenders != 0:
         me, best, widest = _motion_of_ego(ego), -1, -1.0
+        first = 1.0 if _sideways(wish, ego) > 0.0 else -1.0
         for k in range(FAMILY):
-            plan = manoeuvre(k, table.ego)
+            plan = manoeuvre(k, table.ego, first)
             if not _is_possible(me, plan, room, table):
                 continue
             separation, ends = _outcome(me, plan, users, memory, offenders, table, who)
@@ -116,12 +119,14 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
             if urgent and separation > widest + 1e-3:
                 best, widest = k, separation
         if best >= 0:
-            return Effort(_command(manoeuvre(best, table.ego), ego, body, bounds, table), True, True)
-    if evading:
-        return Effort(
-            Command(wish.acceleration, straighten(ego, wish.acceleration, bounds, body, table.dt)), True, True
-        )
-    return Effort(wish, False, False)
+            plan = manoeuvre(best, table.ego, first)
+            evading = evading or plan.swerve > 0.0
+            held = plan.swerve == 0.0 and evading and _returns(wish, ego, users, memory, table, who)
+            return Effort(_command(plan, wish, held, ego, body, bounds, table), evading, True)
+    if evading and _returns(wish, ego, users, memory, table, who):
+        straight = straighten(ego, wish.acceleration, bounds, body, table.dt)
+        return Effort(Command(wish.acceleration, straight), True, True)
+    return Effort(wish, evading, False)
 
 
 @inner
@@ -215,13 +220,40 @@ def _keeps_aside(me, plan, other, table):
 
 
 @inner
-def _command(plan, ego, body, bounds, table):
-    """The first frame of a manoeuvre. Straight on is along the lane."""
+def _command(plan, wish, held, ego, body, bounds, table):
+    """The first frame of a manoeuvre. Without a swerve the driver steers, unless the ego is `held` on its course."""
     if plan.swerve == 0.0 or ego.speed < STANDSTILL:
-        return Command(plan.a, straighten(ego, plan.a, bounds, body, table.dt))
+        return Command(plan.a, straighten(ego, plan.a, bounds, body, table.dt) if held else wish.slip)
     u = ego.speed * np.sin(ego.heading) + plan.a_lat * table.dt
     course = np.arcsin(min(max(u / ego.speed, -1.0), 1.0))
     return Command(plan.a, course - ego.heading)
+
+
+@inner
+def _sideways(wish, ego):
+    """How fast the driver moves across the lane, to the right [m/s]."""
+    return ego.speed * np.sin(ego.heading + wish.slip)
+
+
+@inner
+def _returns(wish, ego, users, memory, table, who):
+    """Does the driver move over to where it is hit, as predicted naively, and is not if it goes straight on?"""
+    me, u = _motion_of_ego(ego), _sideways(wish, ego)
+    side = 1.0 if u > 0.0 else -1.0 if u < 0.0 else 0.0
+    ahead = Motion(me.x, me.v, me.a, me.y, 0.0, 0.0, me.half_length, me.half_width)
+    across = Plan(0.0, side * table.ego.a_lat_max_accel, np.sqrt(_LANE / max(table.ego.a_lat_max_accel, 1e-9)))
+    hit = False
+    for a in range(min(how_many(who, users), _MOST_AT_ONCE)):
+        i = which(who, a)
+        if memory[i].since == 0:
+            continue
+        braking = table.ego.a_min_brake if owes_braking(memory[i], table.rules) != 0 else 0.0
+        other = _motion_of(users[i], memory[i])
+        if smallest_separation(ahead, Plan(-braking, 0.0, 0.0), other, HORIZON, STEP) < 0.0:
+            return False
+        aside = Plan(-braking, across.a_lat, across.swerve)
+        hit = hit or smallest_separation(me, aside, other, HORIZON, STEP) < 0.0
+    return hit
 
 
 @inner

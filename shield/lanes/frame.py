@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled, rare
+from rss_shield.shield._numba.compiled import compiled, inner, rare
 from rss_shield.shield.geometry import (
     AROUND,
     COS,
@@ -24,6 +24,8 @@ class Bend(NamedTuple):
 
     curvature: float  # of an arc that leaves its tangent as far, at the ego's lateral offset, right > 0 [1/m]
     slack: float  # heading, relative to the lane, of a car that kept to the lane, at the end of the frame [rad]
+    turned: float = 0.0  # how far the lane turns [rad]
+    idle: float = 0.0  # heading at the end of the frame from which a fast car keeps to the lane on the next one [rad]
 
 
 def same_frame(road: np.ndarray, other: np.ndarray) -> bool:
@@ -93,7 +95,12 @@ def _account_for_bend(road, k, x, y, lane_heading, cos, sin, dx, dy, half_length
 @compiled
 def beyond(heading, slack):
     """What of a heading relative to the lane is neither between 0 and a slack nor at either [rad]."""
-    low, high = min(slack, 0.0), max(slack, 0.0)
+    return outside(heading, min(slack, 0.0), max(slack, 0.0))
+
+
+@compiled
+def outside(heading, low, high):
+    """How far a heading is above `high`, or below `low` (then negative) [rad]."""
     if heading > high:
         return heading - high
     return heading - low if heading < low else 0.0
@@ -110,26 +117,63 @@ def look_ahead(road, x, y, speed, half_length, dt):
       dt: length of the frame [s].
     """
     if is_straight(road):
-        return Bend(0.0, 0.0)
+        return Bend(0.0, 0.0, 0.0, 0.0)
     return _look_ahead(road, x, y, speed, half_length, dt)
+
+
+_AHEAD = 6  # frames
+_FAST = 1.8  # half wheelbases per frame; from 2 on `idle` counts, and a car may become faster during the frame
 
 
 @rare
 def _look_ahead(road, x, y, speed, half_length, dt):
-    _, lateral, k, heading = nearest_piece(road, x, y)
     distance = max(speed * dt, 1e-3)
+    x_next, y_next, heading, drift, turned = _chord(road, x, y, distance)
+    idle = _idle(road, x_next, y_next, distance, half_length) if distance >= _FAST * half_length else 0.0
+    if turned == 0.0:
+        return Bend(0.0, 0.0, 0.0, idle)
+    after = heading + turned
+    _, _, k, _ = nearest_piece(road, x, y)
+    _, rear = follow(road, k, x_next - half_length * np.cos(after), y_next - half_length * np.sin(after))
+    return Bend(2.0 * drift / distance, wrap_angle(rear - after), turned, idle)
+
+
+@inner
+def _chord(road, x, y, distance):
+    """Along the chord of the lane's arc at a place: (x, y at its end, lane heading at its start, drift, turn).
+
+    Drift is by how much the lane leaves the chord, per metre; turn is that of the lane's heading [rad].
+    """
+    _, lateral, k, heading = nearest_piece(road, x, y)
     kappa = road[k, CURVATURE] / (1.0 - road[k, CURVATURE] * lateral)
-    # the chord of the arc here; where that ends the car leaves the lane on it
+    # where the arc ends the car leaves the lane on the chord
     angle = 0.5 * kappa * distance
     course = heading + angle
     x_next, y_next = x + distance * np.cos(course), y + distance * np.sin(course)
     lateral_next, heading_next = follow(road, k, x_next, y_next)
-    if heading_next == heading:
-        return Bend(0.0, 0.0)
     drift = np.sin(angle) - (lateral_next - lateral) / distance
-    turned = heading + wrap_angle(heading_next - heading)
-    _, rear = follow(road, k, x_next - half_length * np.cos(turned), y_next - half_length * np.sin(turned))
-    return Bend(2.0 * drift / distance, wrap_angle(rear - heading_next))
+    return x_next, y_next, heading, drift, wrap_angle(heading_next - heading)
+
+
+@rare
+def _idle(road, x, y, distance, half_length):
+    """`Bend.idle` at a place: the slip that keeps a car there to the lane also gives it the next such heading.
+
+    With G half wheelbases per frame, slip beta moves it across the lane by psi + beta - drift, and its heading psi
+    becomes psi + G beta - turn. So psi = (G drift - turn - next psi) / (G - 1). In a steady bend that repeats itself
+    for psi = curvature (distance / 2 - half_length), which is taken to hold after a few frames: what that is wrong by
+    shrinks by G - 1 with each of them.
+    """
+    gain = distance / half_length
+    idle, weight = 0.0, 1.0
+    for _ in range(_AHEAD):
+        x, y, _, drift, turned = _chord(road, x, y, distance)
+        weight /= gain - 1.0
+        idle += weight * (gain * drift - turned)
+        weight = -weight
+    _, lateral, k, _ = nearest_piece(road, x, y)
+    kappa = road[k, CURVATURE] / (1.0 - road[k, CURVATURE] * lateral)
+    return idle + weight * kappa * (0.5 * distance - half_length)
 
 
 @compiled

@@ -6,10 +6,11 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.command import Command
-from rss_shield.shield.lanes.frame import beyond
+from rss_shield.shield.lanes.frame import outside
 from rss_shield.shield.lanes.pair import STANDSTILL
 
 _STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
+_HEADING_FIRST = 2.0  # half wheelbases per frame: the heading of a faster car would not calm down by itself
 
 
 class Body(NamedTuple):
@@ -19,6 +20,8 @@ class Body(NamedTuple):
     max_slip: float  # largest slip angle the steering reaches [rad]
     curvature: float  # of the lane under the ego, see `shield.lanes.frame.Bend` [1/m]
     slack: float = 0.0  # likewise [rad]
+    turned: float = 0.0  # likewise [rad]
+    idle: float = 0.0  # likewise [rad]
     backs_up: bool = False  # its driver asks for reverse by braking at standstill; others only hold then
 
 
@@ -58,20 +61,21 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
         return _restrict_slip_backwards(slip, bounds, ego, body, rules, dt)
     v_next = max(v + a * dt, STANDSTILL)
     psi, gain = ego.heading, v * dt / body.half_wheelbase
-    turned = body.curvature * v * dt  # the lane turns under the car during the frame ...
-    drift = 0.5 * turned * v  # ... and curves away from its tangent [m/s]
+    arc = body.curvature * v * dt  # the lane turns under the car during the frame ...
+    turned = body.turned if gain >= _HEADING_FIRST else arc
+    drift = 0.5 * arc * v  # ... and curves away from its tangent [m/s]
     psi_next = psi + gain * np.sin(slip) - turned
-    permitted = _is_permitted(psi + slip, psi_next, body.slack, v, v_next, drift, bounds, rules)
+    free = _idle_headings(body, v, v_next, dt)
+    permitted = _is_permitted(psi + slip, psi_next, free, v, v_next, drift, bounds, rules)
     if permitted and abs(slip) <= body.max_slip:
         return slip
-    neutral = _straightening_slip(psi, turned, drift, gain, v, v_next, bounds)
+    neutral = _straightening_slip(psi, turned, drift, gain, v, v_next, free, bounds)
 
     # lateral speed of this frame: -left <= v sin(psi + slip) - drift <= right
     low = min(_arcsin((-bounds.left + drift) / v) - psi, neutral)
     high = max(_arcsin((bounds.right + drift) / v) - psi, neutral)
     # heading after this frame, by the speed it commits to and by the heading bound
-    psi_low = _arcsin(-bounds.left_next / v_next) + min(body.slack, 0.0)
-    psi_high = _arcsin(bounds.right_next / v_next) + max(body.slack, 0.0)
+    psi_low, psi_high = _arcsin(-bounds.left_next / v_next) + free[0], _arcsin(bounds.right_next / v_next) + free[1]
     if rules.heading_bound < 1.0:
         # the course, slip included, keeps the bound too: a leader's way along the lane relies on it
         largest = np.arcsin(rules.heading_bound)
@@ -105,11 +109,26 @@ def _restrict_slip_backwards(slip, bounds, ego, body, rules, dt):
 
 
 @inner
-def _is_permitted(course, psi_next, slack, v, v_next, drift, bounds, rules):
+def _idle_headings(body, v, v_next, dt):
+    """Headings after a frame that commit the car to no sideways motion: (lowest, highest), relative to the lane [rad].
+
+    On a straight lane that is 0. In a bend a car which keeps to it turns about its rear axle, whose lane has another
+    heading: anything up to that is harmless, because the next slip sets the lateral speed as it should be. No longer so
+    once the heading has to be set instead (`_straightening_slip`): what counts then is the very heading that keeps the
+    car to the lane frame by frame (`shield.lanes.frame.Bend.idle`), and it is on the other side (hole C9).
+    """
+    if v_next * dt < _HEADING_FIRST * body.half_wheelbase:
+        return min(body.slack, 0.0), max(body.slack, 0.0)
+    idle = body.idle + 0.5 * body.curvature * (v_next - v) * dt  # at the speed after the frame
+    return idle, idle
+
+
+@inner
+def _is_permitted(course, psi_next, free, v, v_next, drift, bounds, rules):
     """Do course and next heading [rad] keep all bounds? The bounds in closed form, without solving for the slip."""
     if abs(course) >= _STEEP or abs(psi_next) >= _STEEP:
         return False
-    sin, sin_next, sin_committed = np.sin(course), np.sin(psi_next), np.sin(beyond(psi_next, slack))
+    sin, sin_next, sin_committed = np.sin(course), np.sin(psi_next), np.sin(outside(psi_next, free[0], free[1]))
     steepest = rules.heading_bound
     return (
         -bounds.left <= v * sin - drift <= bounds.right
@@ -133,27 +152,38 @@ def straighten(ego, a, bounds, body, dt):
     v = ego.speed
     if v < STANDSTILL:
         return 0.0
-    turned = body.curvature * v * dt
-    v_next = max(v + a * dt, STANDSTILL)
-    return _straightening_slip(ego.heading, turned, 0.5 * turned * v, v * dt / body.half_wheelbase, v, v_next, bounds)
+    v_next, gain = max(v + a * dt, STANDSTILL), v * dt / body.half_wheelbase
+    free = _idle_headings(body, v, v_next, dt)
+    arc = body.curvature * v * dt
+    turned = body.turned if gain >= _HEADING_FIRST else arc
+    return _straightening_slip(ego.heading, turned, 0.5 * arc * v, gain, v, v_next, free, bounds)
 
 
 @inner
-def _straightening_slip(psi, turned, drift, gain, v, v_next, bounds):
+def _straightening_slip(psi, turned, drift, gain, v, v_next, free, bounds):
     """Slip that ends the sideways motion [rad].
 
     For G <= 1 the lateral speed itself is set to 0 and the heading follows by the factor 1 - G.
     Beyond, the heading is set as the lane asks, and the lateral speed shrinks by 1 - 1/G on the way. While
-    G < 2 the heading still calms down by itself, and the lateral speed keeps its bound first.
+    G < 2 the heading still calms down by itself, and the lateral speed keeps its bound first. For G > 2 it would not:
+    what the speed is short of its bound by comes back by the factor G - 1 on the other side, so that is done only as
+    far as the bound there permits.
     """
     if gain <= 1.0:
         return _arcsin(drift / v) - psi
     along = _arcsin(drift * v_next / v**2) - _arcsin(turned / gain)  # heading of a car that keeps to the bend
+    if gain >= _HEADING_FIRST and free[0] == free[1]:
+        along = free[0]
     slip = _arcsin((turned - psi + along) / gain)
-    if gain < 2.0:
-        u = v * np.sin(psi + slip) - drift
-        slip = _arcsin((min(max(u, -bounds.left), bounds.right) + drift) / v) - psi
-    return slip
+    u = v * np.sin(psi + slip) - drift
+    within = min(max(u, -bounds.left), bounds.right)
+    if gain < _HEADING_FIRST:
+        return _arcsin((within + drift) / v) - psi
+    if within == u:
+        return slip
+    low = min(_arcsin((_arcsin(-bounds.left_next / v_next) + free[0] - psi + turned) / gain), slip)
+    high = max(_arcsin((_arcsin(bounds.right_next / v_next) + free[1] - psi + turned) / gain), slip)
+    return min(max(_arcsin((within + drift) / v) - psi, low), high)
 
 
 @inner

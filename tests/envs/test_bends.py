@@ -12,12 +12,14 @@ from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import road_through
 from rss_shield.envs.worlds.random_roads import Element, Pose, Tailgater, advance, lane_beside
 from rss_shield.shield.command import Command
+from rss_shield.shield.definitions.response import lateral_speed_limit
 from rss_shield.shield.geometry import locate
 from rss_shield.shield.lanes.frame import Bend, look_ahead, to_lane_frame
 from rss_shield.shield.lanes.limits import always_on
-from rss_shield.shield.lanes.pair import ROAD_USER
+from rss_shield.shield.lanes.pair import ROAD_USER, toward
 from rss_shield.shield.lanes.restriction import Body, restrict
 from rss_shield.shield.params import Table
+from rss_shield.shield.table import table_for
 
 TABLE = PRESETS["simulator"]
 BOX = np.array([5.0, 2.0, 2.5, 1.0])
@@ -119,7 +121,7 @@ def test_an_ego_that_may_move_to_neither_side_stays_where_it_is_in_the_lane(shap
         bend = Bend(*look_ahead(road, x, y, speed, 2.5, dt))
         bounds = always_on(ego, TABLE.ego, Rules(), dt)._replace(left=0.0, right=0.0, left_next=0.0, right_next=0.0)
         wish = Command(0.0, rng.uniform(-0.3, 0.3))
-        slip = restrict(wish, bounds, ego, body._replace(curvature=bend.curvature, slack=bend.slack), Rules(), dt).slip
+        slip = restrict(wish, bounds, ego, body._replace(**bend._asdict()), Rules(), dt).slip
         before = x, y
         x, y = x + speed * dt * np.cos(heading + slip), y + speed * dt * np.sin(heading + slip)
         heading += speed * np.sin(slip) / 2.5 * dt
@@ -146,6 +148,69 @@ def test_an_ego_in_a_bend_may_begin_to_move_to_either_side(radius, turn):
     for sideways in (-0.3, 0.3):
         wish = Command(0.0, turning + sideways / speed)
         assert restrict(wish, bounds, ego, body, Rules(), dt).slip != wish.slip
+
+
+def excess_toward_a_side(pieces, speed, acceleration, rng, drop=lambda bend: bend):
+    """Largest excess over the lateral speed that Def. 8 grants toward one side, from a random frame on [m/s].
+
+    At 5 Hz, with a driver who steers at random; drop: what the shield is told of the bend.
+    """
+    dt = 0.2
+    table, road = table_for(TABLE, Rules(), dt), road_through(build(pieces), ("0", "1", 0))
+    side, begins = rng.choice([-1.0, 1.0]), rng.integers(1, 8)
+    x, y, heading = on(build(pieces), 25.0, rng.uniform(-1.0, 1.0))
+    before, s, wish, w, worst = (np.nan, np.nan), 25.0, 0.0, 0.0, -np.inf
+    for frame in range(1000):
+        ego = record(road, (x, y, heading), before, speed, dt)
+        bend = Bend(*look_ahead(road, x, y, speed, 2.5, dt))
+        bounds = always_on(ego, table.ego, Rules(), dt)
+        if frame == begins:
+            w = max(toward(side, ego), 0.0)
+        elif frame > begins:
+            now, soon = (lateral_speed_limit(frame - begins + k, w, table.ego, dt) for k in (0, 1))
+            left, right = (now, bounds.right) if side < 0.0 else (bounds.left, now)
+            left_next, right_next = (soon, bounds.right_next) if side < 0.0 else (bounds.left_next, soon)
+            bounds = bounds._replace(left=left, right=right, left_next=left_next, right_next=right_next)
+        if rng.random() < 0.3:
+            wish = rng.uniform(-0.1, 0.1)
+        a = acceleration if speed < 32.0 else 0.0
+        slip = restrict(Command(a, wish), bounds, ego, Body(2.5, 0.7, *drop(bend)), Rules(), dt).slip
+        if frame > begins:
+            u = speed * np.sin(ego["heading"] + slip) - 0.5 * bend.curvature * speed**2 * dt  # as the judge has it
+            worst = max(worst, side * u - now)
+        before = x, y
+        x, y = x + speed * dt * np.cos(heading + slip), y + speed * dt * np.sin(heading + slip)
+        heading += speed * np.sin(slip) / 2.5 * dt
+        s, speed = s + speed * dt, speed + a * dt
+        if s > sum(length for _, length in pieces) - 40.0:
+            return worst
+    raise AssertionError
+
+
+LONG_FRAMES = {  # of exit-v0, and into a bend and out of it
+    "bend": [(1 / 150, 250.0)],
+    "straight, left, straight": [(0.0, 60.0), (-1 / 150, 80.0), (0.0, 100.0)],
+}
+
+
+@pytest.mark.parametrize("shape", LONG_FRAMES)
+@pytest.mark.parametrize(("speed", "acceleration"), [(23.0, 2.0), (29.0, 0.0), (31.5, -2.0)])
+def test_an_ego_in_a_bend_stops_moving_to_a_side_in_time_also_where_frames_are_long(shape, speed, acceleration):
+    """Beyond two half wheelbases per frame the heading decides (condition C9)."""
+    rng = np.random.default_rng(4)
+    excess = [excess_toward_a_side(LONG_FRAMES[shape], speed, acceleration, rng) for _ in range(8)]
+    assert max(excess) < 1e-6
+
+
+def test_condition_c9_is_needed():
+    """With the heading of a car that keeps to the bend in short frames the duty is broken again and again."""
+    rng = np.random.default_rng(4)
+
+    def as_if_short(bend):
+        return bend._replace(turned=bend.curvature * 29.0 * 0.2, idle=bend.slack)
+
+    excess = [excess_toward_a_side(LONG_FRAMES["bend"], 29.0, 0.0, rng, as_if_short) for _ in range(8)]
+    assert max(excess) > 0.1
 
 
 # ---------------------------------------------------------------- who is blamed

@@ -26,10 +26,17 @@ RING = "roundabout-v0"
 def test_whoever_traps_or_rams_the_ego_is_to_blame(traffic, seed, actions, tmp_path):
     path = tmp_path / "found.npz"
     assert keep_trace(Block(RING, "random", "", "override", seed, 1, traffic), seed, actions, path) == "other"
-    assert load(path).meta["broken_duties"] == 0
+    trace = load(path)
+    assert trace.meta["broken_duties"] == 0
+    assert judge_trace(trace, users=list(trace.ego_users)).verdict_of(trace.ego_users[0]) == "other"
 
 
-def test_the_judge_agrees_about_who_drives_on_against_the_ring(tmp_path):
-    path = tmp_path / "found.npz"
-    keep_trace(Block(RING, "random", "", "override", 0, 1, "wrongway"), 0, "1 2 0 0", path)
-    assert judge_trace(load(path), users=list(load(path).ego_users)).verdict_of(load(path).ego_users[0]) == "other"
+def test_who_only_watches_sees_that_somebody_has_trapped_the_ego(tmp_path):
+    """H24: once the judge said "none", because only a shield that acts knew that no plan was left."""
+    path, kind = tmp_path / "found.npz", "bounded-mixed"
+    actions = "2 2 1 0 1 1 1 0 2 0 0 1 0"
+    block = Block("intersection-v0", "random", "", "override", 2_100_006, 1, kind)
+    assert keep_trace(block, 2_100_006, actions, path) == "other"
+    trace = load(path)
+    judgement = judge_trace(trace, users=list(trace.ego_users))
+    assert judgement.verdict_of(trace.ego_users[0]) == "other"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench import adversary
-from bench.evasion import counted, page_of
+from bench.evasion import counted, page_of, parts_at
 from rss_shield import make_vec
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.shield.params import Rules
@@ -56,9 +56,27 @@ def test_pairs_are_counted_by_what_became_of_them():
     ]
     found = counted([ROW | {"pairs": pairs}])
     assert found == {"pairs": 100, "contacts": 9, "avoided": 6, "new": 1, "at_fault": 0}
-    page = page_of([ROW | {"pairs": pairs}], [])
+    # of the 9 with a contact: in 5 another action made a difference, too; it avoided 2 of these, the manoeuvre 4
+    chance = [
+        ["other", "no contact", "other", 3],
+        ["other", "no contact", "no contact", 1],
+        ["other", "other", "no contact", 1],
+        ["no contact", "other", "no contact", 1],
+        ["no contact", "no contact", "other", 3],
+    ]
+    page = page_of([ROW | {"pairs": pairs, "chance": chance}], [])
+    assert "| stock | 4 of 5 (80% [28%, 99%]) | 2 of 5 (40% [5%, 85%]) | 1 of 4 (25% [1%, 81%]) | 3 of 4 " in page
     assert "| merge-v0 | 100 | 9 | 6 (67% [30%, 93%]) | 1 (1.10% [0.03%, 5.97%])" in page
     assert counted([ROW | {"pairs": [["other", "both", 2]]}])["at_fault"] == 2
+
+
+def test_paths_part_at_the_first_decision_that_differs():
+    one = np.zeros((5, 3))
+    other = one.copy()
+    assert parts_at(one, other) == -1
+    other[3, 1] = 1e-9
+    assert parts_at(one, other) == 3
+    assert parts_at(one, one[:4]) == 4  # one ended earlier
 
 
 @pytest.mark.parametrize("name", adversary.SHIELDS)

@@ -5,7 +5,7 @@ import pytest
 
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.evasion import Motion, follow
-from rss_shield.shield.definitions.response import LON
+from rss_shield.shield.definitions.response import FRONT, LON
 from rss_shield.shield.lanes.evasion import FAMILY, HORIZON, Room, evade, manoeuvre
 from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.memory import MEMORY
@@ -37,12 +37,12 @@ def remembered(since, broke=KEPT, a=0.0, v=20.0):
     return one
 
 
-def effort(others, room=WIDE, ego=None, evading=False):
+def effort(others, room=WIDE, ego=None, evading=False, wish=WISH):
     """others: (`ROAD_USER`, `MEMORY`) pairs."""
     ego = user(0.0, 0.0, 20.0) if ego is None else ego
     users, memory = (np.array([pair[k] for pair in others], kind) for k, kind in ((0, ROAD_USER), (1, MEMORY)))
     bounds = always_on(ego, TABLE.ego, TABLE.rules, TABLE.dt)
-    return evade(WISH, evading, ego, users, memory, room, BODY, bounds, TABLE, None)
+    return evade(wish, evading, ego, users, memory, room, BODY, bounds, TABLE, None)
 
 
 def test_without_danger_the_drivers_wish_stays():
@@ -55,8 +55,8 @@ def test_where_the_basic_response_is_enough_the_drivers_wish_stays():
     # with 10 m/s^2 it stops after 20 m: 45 m are enough for 5 m/s^2 (40 m), 38 m only for more
     assert not effort([(user(30.0, 0.0, 20.0), remembered(3, TOO_SHORT, -10.0))]).changed
     wish, evading, changed = effort([(user(23.0, 0.0, 20.0), remembered(3, TOO_SHORT, -10.0))])
-    assert evading and changed
-    assert wish == pytest.approx((-5.5, 0.0))  # 36.4 m
+    assert changed and not evading  # nobody has moved over
+    assert wish == pytest.approx((-5.5, WISH.slip))  # 36.4 m; the driver goes on steering
 
 
 def ahead_and_aside(y):
@@ -105,6 +105,32 @@ def test_once_it_has_moved_over_it_goes_straight_on_while_danger_lasts():
     wish, evading, changed = effort([beside], ego=ego, evading=True)
     assert evading and changed
     assert wish.acceleration == WISH.acceleration and wish.slip < 0.0  # turns back along the lane
+
+
+def test_after_it_has_moved_over_the_driver_may_go_on_away_from_who_is_there():
+    memory = remembered(3)
+    memory["ego_is_rear"], memory["role_now"] = False, FRONT  # or it would brake
+    beside = user(0.0, 3.0, 20.0), memory
+    away = Command(0.5, -0.02)
+    assert effort([beside], evading=True, wish=away) == (away, True, False)
+    assert effort([beside], evading=True, wish=Command(0.5, 0.02)).changed
+
+
+def test_where_going_straight_on_ends_in_a_contact_too_the_driver_decides():
+    # 15 m behind somebody who stands, with somebody beside: nothing helps
+    ahead, beside = (user(15.0, 0.0, 0.0), remembered(3, TOO_SHORT)), (user(0.0, 3.0, 20.0), remembered(3))
+    wish = Command(0.5, 0.02)
+    assert effort([ahead, beside], evading=True, wish=wish) == (wish, True, False)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_of_two_ways_out_the_one_to_the_drivers_side_comes_first(side):
+    # 0.2 m wide, 30 m ahead: braking needs 33 m, and 1.1 m aside are done after 1.5 s
+    narrow, memory = user(35.0, 0.0, 1.0), remembered(3, TOO_SHORT)
+    narrow["half_width"] = 0.1
+    wish, evading, changed = effort([(narrow, memory)], wish=Command(0.0, 0.001 * side))
+    assert evading and changed
+    assert side * wish.slip > 0.0
 
 
 def test_the_family_moves_over_by_one_two_and_four_metres():
