@@ -1,8 +1,8 @@
 """Our measures of criticality beside CommonRoad-CriMe's own code, on small scenes.
 
-CriMe does not install beside our other tests: it asks for an older protobuf, osqp and opencv. In an environment of its own:
-`pip install commonroad-crime --no-deps`, likewise commonroad-io, -clcs, -drivability-checker, -reach, -route-planner and
--vehicle-models, then what these import.
+CriMe does not install beside our other tests: it asks for an older protobuf, osqp and opencv. In an environment of its
+own: `pip install commonroad-crime --no-deps`, likewise commonroad-io, -clcs, -drivability-checker, -reach,
+-route-planner and -vehicle-models, then what these import.
 """
 
 import math
