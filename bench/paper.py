@@ -19,11 +19,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from campaign import PLANS, folder_of
-
-from rss_shield.eval.runs.experiment import read_experiment
-
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from bench.campaign import PLANS, folder_of  # noqa: E402
+from rss_shield.eval.runs.experiment import read_experiment  # noqa: E402
+
 SWEEPS = ("ablation", "rules", "presets", "response-times")
 ON_THEIR_PAGE = ("presets", "response-times")
 COMPARED = {"highway-fast-v0": 200_000, "intersection-v0": 50_000}  # decisions of the runs on the page of PPO
