@@ -11,18 +11,13 @@ from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.longitudinal import d_min_following
 from rss_shield.shield.definitions.response import LAT, LON, NEITHER
 from rss_shield.shield.lanes.anticipation import acceleration_cap, lateral_cap, share_kept
-from rss_shield.shield.lanes.controller import (
-    RESPONSE_BRAKE,
-    RESPONSE_STEER,
-    Body,
-    always_on,
-    find_danger,
-    respond,
-    restrict,
-)
+from rss_shield.shield.lanes.controller import find_danger, respond
 from rss_shield.shield.lanes.judge import audit_command, judge_contact, judge_frame, judge_motion
+from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.memory import MEMORY, may_back_up, owes, remember, role_of_ego, role_of_other
 from rss_shield.shield.lanes.pair import ROAD_USER, assess
+from rss_shield.shield.lanes.responses import RESPONSE_BRAKE, RESPONSE_STEER
+from rss_shield.shield.lanes.restriction import Body, restrict
 from rss_shield.shield.params import PRESETS, Rules
 from rss_shield.shield.sampling import lateral_euler_margin
 from rss_shield.shield.table import table_for
