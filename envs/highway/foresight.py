@@ -58,7 +58,7 @@ def _on_lanes(ego: ShieldedEgo, names: list[str], frames: int) -> np.ndarray:
         settings = without_anticipation(ego.settings)
         users, me, bend = ego._sense()
         seen, stage = Seen(me, users, *ego.last, ego.memory), make_stage(len(users))
-        body = Body(*ego.body, **bend._asdict())
+        body = Body(*ego.body, bend.curvature, bend.slack, bend.turned, bend.idle, False)
         for a, name in enumerate(names):
             with _as_if(vehicle, name):
                 target = vehicle.target_lane_index

@@ -85,7 +85,8 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
     It is owed in danger with somebody who has broken its duty, or who is hit, as predicted naively, although the ego
     keeps its basic response; unless that response is such a manoeuvre itself. Among those that touch nobody the first
     that ends out of danger counts; where somebody would be hit else, the one that stays farthest from whoever is in
-    danger with the ego. Once it has moved over, the ego goes straight on until the danger is over.
+    danger with the ego. As long as none swerves, the driver steers. Once the ego has moved over, and until the danger
+    is over, it goes straight on wherever its driver would return to where it is hit.
 
     Args:
       wish: `Command` of the ego's driver.
@@ -241,8 +242,7 @@ def _returns(wish, ego, users, memory, table, who):
     me, u = _motion_of_ego(ego), _sideways(wish, ego)
     side = 1.0 if u > 0.0 else -1.0 if u < 0.0 else 0.0
     ahead = Motion(me.x, me.v, me.a, me.y, 0.0, 0.0, me.half_length, me.half_width)
-    across = Plan(0.0, side * table.ego.a_lat_max_accel, np.sqrt(_LANE / max(table.ego.a_lat_max_accel, 1e-9)))
-    hit = False
+    a_lat, hit = table.ego.a_lat_max_accel, False
     for a in range(min(how_many(who, users), _MOST_AT_ONCE)):
         i = which(who, a)
         if memory[i].since == 0:
@@ -251,7 +251,7 @@ def _returns(wish, ego, users, memory, table, who):
         other = _motion_of(users[i], memory[i])
         if smallest_separation(ahead, Plan(-braking, 0.0, 0.0), other, HORIZON, STEP) < 0.0:
             return False
-        aside = Plan(-braking, across.a_lat, across.swerve)
+        aside = Plan(-braking, side * a_lat, np.sqrt(_LANE / max(a_lat, 1e-9)))
         hit = hit or smallest_separation(me, aside, other, HORIZON, STEP) < 0.0
     return hit
 

@@ -79,6 +79,15 @@ def test_it_does_not_squeeze_who_is_there():
     assert effort([ahead_and_aside(1.7), (user(0.0, 3.0, 20.0), remembered(0))]).changed  # on the other side
 
 
+def test_it_does_not_swerve_in_front_of_who_comes_the_other_way():
+    # one lane to the left, 60 m ahead, 20 m/s: the next 2 m to that side are his, and within the lane there is no way out
+    coming = user(60.0, -3.0, 20.0)
+    coming["cos"], coming["along"] = -1.0, -20.0
+    assert not effort([ahead_and_aside(1.7), (coming, remembered(0))]).changed
+    coming["y"] = -6.0
+    assert effort([ahead_and_aside(1.7), (coming, remembered(0))]).changed
+
+
 def test_it_does_not_leave_the_road():
     assert not effort([ahead_and_aside(1.7)], Room(0.9, 10.0)).changed
     assert effort([ahead_and_aside(1.7)], Room(1.1, 0.0)).changed
@@ -107,13 +116,14 @@ def test_once_it_has_moved_over_it_goes_straight_on_while_danger_lasts():
     assert wish.acceleration == WISH.acceleration and wish.slip < 0.0  # turns back along the lane
 
 
-def test_after_it_has_moved_over_the_driver_may_go_on_away_from_who_is_there():
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_after_it_has_moved_over_the_driver_may_go_on_away_from_who_is_there(side):
     memory = remembered(3)
     memory["ego_is_rear"], memory["role_now"] = False, FRONT  # or it would brake
-    beside = user(0.0, 3.0, 20.0), memory
-    away = Command(0.5, -0.02)
+    beside = user(0.0, 3.0 * side, 20.0), memory
+    away = Command(0.5, -0.02 * side)
     assert effort([beside], evading=True, wish=away) == (away, True, False)
-    assert effort([beside], evading=True, wish=Command(0.5, 0.02)).changed
+    assert effort([beside], evading=True, wish=Command(0.5, 0.02 * side)).changed
 
 
 def test_where_going_straight_on_ends_in_a_contact_too_the_driver_decides():
