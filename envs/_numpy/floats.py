@@ -63,10 +63,15 @@ def clip(x, low, high):
 
 @inner
 def wrap_to_pi(angle):
-    """`highway_env.utils.wrap_to_pi`, without the division where the angle is in range already [rad]."""
+    """`highway_env.utils.wrap_to_pi`, without the division where the angle is at most one turn out of range [rad].
+
+    Then the remainder is what one addition gives: to subtract 2 pi from less than twice that is exact.
+    """
     shifted = angle + np.pi
-    if shifted < 0.0 or shifted >= 2 * np.pi:
-        shifted %= 2 * np.pi
+    if shifted >= 2 * np.pi:
+        shifted = shifted - 2 * np.pi if shifted < 4 * np.pi else shifted % (2 * np.pi)
+    elif shifted < 0.0:
+        shifted = shifted + 2 * np.pi if shifted > -2 * np.pi else shifted % (2 * np.pi)
     return shifted - np.pi
 
 

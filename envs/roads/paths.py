@@ -199,6 +199,7 @@ def join(layout: Layout, ego, swept: list[Swept]) -> Paths:
     times = len(swept)
     conflicts = np.concatenate([one.conflicts for one in swept], 1)
     lane, offset = np.tile(layout.lane, (times, 1)), np.tile(layout.offset, (times, 1))
+    crossed = np.tile(_crossed(layout.lane, offset, conflicts), (times, 1))
     return Paths(
         ego,
         np.tile(layout.cells, times),
@@ -208,11 +209,18 @@ def join(layout: Layout, ego, swept: list[Swept]) -> Paths:
         conflicts,
         np.concatenate([one.first for one in swept], 1),
         np.tile(_priorities(layout.lane, layout.offset, swept[0].conflicts, layout.rank), (1, times)),
-        np.tile(_crossed(layout.lane, offset, conflicts), (times, 1)),
+        crossed,
         np.where(layout.lane >= 0, layout.lanes["speed_limit"][layout.lane], np.inf),
         np.concatenate([one.boxes for one in swept]),
+        _next_true(crossed),
         np.tile(_joins(layout.lane, layout.offset), (1, times, 1)),
     )
+
+
+def _next_true(flags) -> np.ndarray:
+    """First column from each on in which a row of flags `[Q, C]` is True; C = none."""
+    columns = np.where(flags, np.arange(flags.shape[1]), flags.shape[1])
+    return np.minimum.accumulate(columns[:, ::-1], axis=1)[:, ::-1].astype(np.int32)
 
 
 def _reached(lane) -> np.ndarray:

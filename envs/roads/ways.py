@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rss_shield.envs._numpy.floats import wrap_to_pi
 from rss_shield.envs.roads.bits import first_of, without_first
 from rss_shield.envs.roads.network import (
     CAR_LENGTH,
@@ -106,6 +107,7 @@ class Roads(NamedTuple):
     lead: np.ndarray  # `[L]` how far before its start cars come to a lane [m]
     following: np.ndarray  # `[L]` each lane and those that follow, as sets of bits
     beside: np.ndarray  # `[L]` each lane and those beside it, likewise
+    reachable: np.ndarray  # `[L]` each lane, those that follow, and those beside any of these, likewise
     alongside: np.ndarray  # `[Q, L]` path through each lane that runs as much as possible like each path
     onward: np.ndarray  # `[P, L]` path of stock cars through each lane that goes on like each; -1 = not by that road
 
@@ -134,6 +136,7 @@ class Junction:
         self._known: dict[tuple, int] = {}
         lanes = compile_network(network, False).lanes
         self.lead, self.following, self.beside = lead_of(network), successors_of(network), beside(network)
+        self.reachable = np.array([_union(int(lanes_after), self.beside) for lanes_after in self.following])
         self.limit = float(lanes["speed_limit"].max())
         self.lanes = lanes
         self._layout, self._dt = lay_out(network), dt
@@ -190,6 +193,7 @@ class Junction:
             self.lead,
             self.following,
             self.beside,
+            self.reachable,
             self.alongside,
             self._onward,
         )
@@ -411,7 +415,7 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
                         break
                     samples[i].strays = True
         samples[i].next_lanes = _joined(samples[i].lanes, roads.following)
-        samples[i].reachable = _joined(samples[i].next_lanes, roads.beside)
+        samples[i].reachable = _joined(samples[i].lanes, roads.reachable)
         samples[i].astray = count == before and not car.wreck
         if count == before or _stands_out(roads.paths, threats[before:count], i, car):
             if count < len(threats):
@@ -441,12 +445,18 @@ def _fitting(roads, car, expected):
     return lanes
 
 
+def _union(lanes: int, sets: np.ndarray) -> int:
+    """`_joined`, for Python."""
+    return int(np.bitwise_or.reduce([int(sets[lane]) for lane in range(len(sets)) if lanes >> lane & 1]))
+
+
 @compiled
 def _joined(lanes, sets):
     """Union of the sets `[L]` of some lanes, all as bits."""
     union = 0
-    for lane in range(len(sets)):
-        union |= sets[lane] & -(lanes >> lane & 1)  # without a branch: several lanes at once
+    while lanes != 0:
+        union |= sets[first_of(lanes)]
+        lanes = without_first(lanes)
     return union
 
 
@@ -461,7 +471,7 @@ def _fits(lane, car, before, off, turned):
     s, lateral = local_coordinates(lane, car.x, car.y)
     if abs(lateral) > off or s < -before or s > lane.length + _BEYOND:
         return False
-    return abs(wrap_angle(car.heading - heading_at(lane, s))) < turned
+    return abs(wrap_to_pi(car.heading - heading_at(lane, s))) < turned
 
 
 @compiled

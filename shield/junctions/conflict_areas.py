@@ -36,6 +36,7 @@ class Paths(NamedTuple):
     crossed: np.ndarray  # `[Q, C]` an ego standing there is in the way of a path that it is not on
     speed_limit: np.ndarray  # `[P, C]` [m/s], inf = none
     swept: np.ndarray  # `[Q, C, 6]` what others sweep in each cell
+    line: np.ndarray  # `[Q, C]` int32: first cell from each on that is `crossed`; C = none
     joins: np.ndarray  # `[P, Q, C]` int32: next cell of the first path on a lane of the second; `FAR` = none
 
 

@@ -22,12 +22,13 @@ from rss_shield.shield.junctions.plans import (
     EVERYBODY,
     NEVER,
     SLACK,
+    braking_after,
     go_plan,
     on_path_of_ego,
     stop_conflict,
     throttle,
 )
-from rss_shield.shield.junctions.toward_one import is_resolute
+from rss_shield.shield.junctions.toward_one import is_resolute, next_alone
 from rss_shield.shield.lanes.responses import RESPONSE_BRAKE, RESPONSE_GO
 
 
@@ -81,10 +82,13 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         plan.held_at = a if a < limited else np.inf
     else:
         trapped = is_trapped(scene, plan)
-    pairs = broken = 0
+    pairs = broken = at = 0
+    hardest = limit(scene.table.ego.a_max_accel, scene.track.v, scene.table.ego, scene.table.dt)
+    strongest = braking_after(scene, max(hardest, a))
     for i in range(len(samples)):
         known = clear and (which <= TABLE or not is_left_out(scene, i))
-        dangerous, kept = judge_user(scene, i, samples[i], memory[i], a, known, trapped)
+        alone, at = next_alone(scene, i, at)
+        dangerous, kept = judge_user(alone, i, samples[i], memory[i], a, strongest, known, trapped)
         pairs += dangerous
         broken += not kept
     note_who_trapped(plan, memory, trapped, trapped and is_resolute(scene, a))

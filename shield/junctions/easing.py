@@ -16,7 +16,6 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.junctions.conflict_areas import CELL, cell_of
-from rss_shield.shield.junctions.plans import behind_by
 
 SETTLE = 0.08  # at speed v it is over this much times v later, so that its end is soft [s]
 EAGER = 5.0  # margins shrink at this many times the rate of anticipation: nobody but the ego changes them much
@@ -80,9 +79,7 @@ def _before_line(scene, at_line, rate):
     cells = paths.cells[track.path]
     here, end = cell_of(track.s, cells), cells
     if at_line:
-        end = here
-        while end < cells and not paths.crossed[track.path, end]:
-            end += 1
+        end = min(paths.line[track.path, here], cells)
         end = end if end > here else cells
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
@@ -106,7 +103,7 @@ def _behind_others(scene, memory, rate):
         threat = scene.threats[k]
         if threat.path < 0 or threat.ignored or threat.left_out:
             continue
-        ahead = -behind_by(scene.paths, track, threat)
+        ahead = -threat.behind
         if not 0.0 < ahead < np.inf:
             continue
         known = memory[threat.user]

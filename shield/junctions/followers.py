@@ -1,5 +1,7 @@
 """Whom the ego need not stay clear of at a junction: who is behind it, and who is counted on to give way."""
 
+import numpy as np
+
 from rss_shield.shield._numba.compiled import compiled, inner
 from rss_shield.shield.junctions.conflict_areas import CELL, cell_of
 from rss_shield.shield.junctions.memory import ASSERTIVE, CAUTIOUS
@@ -37,9 +39,14 @@ def _stands_for(threat, memory, entry, dt):
 @inner
 def find_those_behind(scene, memory):
     """Note who drives behind the ego, at whatever distance."""
+    entered, before = _entered(scene.paths, scene.track.path, scene.track.s)
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
-        threat.follows = threat.path >= 0 and is_follower(scene, threat, memory[threat.user].behind)
+        threat.behind, threat.follows = -np.inf, False
+        if threat.path >= 0:
+            threat.behind = behind_by(scene.paths, scene.track, threat)
+            known = memory[threat.user].behind
+            threat.follows = _drives_behind(scene, threat, threat.behind, known, entered, before)
 
 
 @inner
@@ -64,13 +71,22 @@ def is_follower(scene, threat, established):
 
     Beside the ego it is no follower, unless it has been one before.
     """
+    distance = behind_by(scene.paths, scene.track, threat)
+    entered, before = _entered(scene.paths, scene.track.path, scene.track.s)
+    return _drives_behind(scene, threat, distance, established, entered, before)
+
+
+@inner
+def _drives_behind(scene, threat, distance, established, entered_ego, from_ego):
+    """`is_follower` of who is at a `distance` behind; the ego headed for its lane at `entered_ego`, from `from_ego`."""
     paths, track = scene.paths, scene.track
     bodies = 0.0 if established else track.half_length + threat.half_length
-    if behind_by(paths, track, threat) > bodies:
+    if distance > bodies:
         return True
-    entered_ego, from_ego = _entered(paths, track.path, track.s)
+    if from_ego < 0:
+        return False
     entered_other, from_other = _entered(paths, threat.path, threat.s)
-    return from_ego >= 0 and from_ego == from_other and track.s - entered_ego - (threat.s - entered_other) > bodies
+    return from_ego == from_other and track.s - entered_ego - (threat.s - entered_other) > bodies
 
 
 @inner
@@ -97,6 +113,6 @@ def is_behind(scene, i):
 @inner
 def keeps_distance(scene, threat):
     """Is a road user behind the ego at a safe distance (Lemma 2)? Where their ways have parted none is needed."""
-    distance = behind_by(scene.paths, scene.track, threat)
+    distance = threat.behind
     gap = distance - scene.track.half_length - threat.half_length
     return distance < 0.0 or gap >= distance_behind(threat, max(threat.v, 0.0), scene.track.v, scene.table.other)

@@ -4,10 +4,14 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import apart, compiled, inner
 from rss_shield.shield.junctions.followers import is_behind
-from rss_shield.shield.junctions.limits import limit
-from rss_shield.shield.junctions.plans import ANYWHERE, NEVER, STOP, look_ahead, stop_conflict
+from rss_shield.shield.junctions.plans import NEVER, STOP, look_ahead, meets_braking
 from rss_shield.shield.junctions.reach import STANDING
-from rss_shield.shield.junctions.toward_one import alone_with, is_resolute, leaves_plan_toward, plans_and_duty
+from rss_shield.shield.junctions.toward_one import (
+    is_resolute,
+    leaves_plan_toward,
+    may_meet,
+    plans_and_duty,
+)
 from rss_shield.shield.verdicts import (
     ACCELERATED,
     BRAKED,
@@ -33,13 +37,14 @@ _JITTER = 0.02  # speeds of others are read off a simulator that integrates in s
 
 
 @compiled
-def judge_user(scene, i, sample, memory, a, clear, trapped):
+def judge_user(scene, i, sample, memory, a, strongest, clear, trapped):
     """Take in one sample of one road user and judge the ego's acceleration toward it.
 
     Args:
-      scene: `Scene`.
+      scene: `Scene` with the ways of this road user only, see `alone_with`.
       i: index of the road user; sample: its SAMPLE; memory: its CROSSING, changed in place.
       a: acceleration that the ego executes on this frame [m/s^2].
+      strongest: what follows if it accelerates as hard as it can, or as hard as that: `Braking`.
       clear: a plan that stays clear of everybody is known to remain afterwards.
       trapped: no plan stays clear of everybody, because somebody appeared or left the bounds. Duties
         toward several then contradict each other: what is owed is to brake, or to go on, with all it has.
@@ -51,15 +56,13 @@ def judge_user(scene, i, sample, memory, a, clear, trapped):
     """
     _judge_motion(sample, memory, scene.table.other, scene.table.dt)
     memory.was_lawless = memory.other_broke != KEPT
-    scene = alone_with(scene, i)
     memory.stood = memory.stood + 1 if abs(sample.speed) < STANDING and not sample.alert else 0
     memory.counted_on = memory.counted_on + 1 if _counts_on_standing(scene, i, a) else 0
     may_follow, follows, gap_is_safe = is_behind(scene, i)
     dangerous, kept, items, cut_in = False, True, STOP, False
     followed, memory.behind = memory.behind, may_follow and (memory.behind or gap_is_safe)
     if not follows:
-        strongest = max(limit(scene.table.ego.a_max_accel, scene.track.v, scene.table.ego, scene.table.dt), a)
-        if stop_conflict(scene, strongest, i, ANYWHERE, 0.0) != NEVER:
+        if may_meet(scene) and meets_braking(scene, strongest, i) != NEVER:
             dangerous = True
             if not clear:
                 items, kept = plans_and_duty(scene, i, a)
@@ -105,8 +108,7 @@ def _judge_motion(sample, memory, other, dt):
     faster = sample.speed - max(memory.speed, min(memory.speed + other.a_max_accel * dt, other.v_cap))
     slower = memory.speed - other.a_max_brake * dt - sample.speed
     duty, excess = KEPT, 0.0
-    moved = np.hypot(sample.x - memory.x, sample.y - memory.y)
-    if sample.wreck and (not memory.wreck or moved > _JITTER * dt):
+    if sample.wreck and (not memory.wreck or np.hypot(sample.x - memory.x, sample.y - memory.y) > _JITTER * dt):
         duty = CRASHED
     elif _leaves_paths(sample, memory):
         duty = LEFT_PATHS

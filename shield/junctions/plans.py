@@ -310,7 +310,13 @@ def tail_conflict(scene, s, v, n, brake, only, at_line, slack):
     if at_line and paths.crossed[path, cell_of(rest, paths.cells[path])]:
         return n
     s_rest, n_rest = _rest(scene, s, v, n, brake, slack)
-    conflict = NEVER
+    return _braking_conflict(scene, s, v, n, s_rest, n_rest, brake, only, slack)
+
+
+@inner
+def _braking_conflict(scene, s, v, n, s_rest, n_rest, brake, only, slack):
+    """`tail_conflict`, with the place and the frame of the ego's rest, wherever that is."""
+    dt, conflict = scene.table.dt, NEVER
     for k in range(len(scene.threats)):
         threat = scene.threats[k]
         if not _counts(threat, n, only):
@@ -429,6 +435,30 @@ def _meets_braking(scene, s, v, n, n_rest, brake, until, slack, threat, falls_be
         s, v = step(s, v, -brake, scene.table.dt)
         n += 1
     return NEVER
+
+
+class Braking(NamedTuple):
+    """A plan that stops: the ego on the next frame, from which on it brakes at `a_min_brake`, and at rest."""
+
+    s: float  # [m]
+    v: float  # [m/s]
+    s_rest: float  # [m]
+    n_rest: int
+
+
+@inner
+def braking_after(scene, a):
+    """The plan "this frame `a`, then brake", for `meets_braking`."""
+    s, v = step(scene.track.s, scene.track.v, a, scene.table.dt)
+    return Braking(s, v, *_rest(scene, s, v, NEXT, scene.table.ego.a_min_brake, 0.0))
+
+
+@inner
+def meets_braking(scene, plan, only):
+    """`stop_conflict` of a plan with one road user, wherever it stops: the plan is the same toward all of them."""
+    begin(scene)
+    brake = scene.table.ego.a_min_brake
+    return _braking_conflict(scene, plan.s, plan.v, NEXT, plan.s_rest, plan.n_rest, brake, only, 0.0)
 
 
 @compiled

@@ -25,6 +25,7 @@ THREAT = records(
         ("stands_for", "f8"),  # it is counted on to stand for this long still [s]; 0 = it is not
         ("red_for", "f8"),  # it is counted on to wait at a light for this long [s]; 0 = it is not
         ("line", "f8"),  # and until then its centre stays behind this arc length [m]
+        ("behind", "f8"),  # how far it is behind the ego on its way, -inf = it is not on that [m]
         ("follows", "?"),  # drives behind the ego on its way
         ("ignored", "?"),  # behind the ego on its lane, or obliged and able to give way
         ("left_out", "?"),  # the ego's plans are not checked against it: see `shield.junctions.examined`

@@ -17,6 +17,27 @@ def alone_with(scene, i):
     return Scene(scene.paths, scene.track, scene.threats[first:last], scene.table, scene.drift)
 
 
+@inner
+def next_alone(scene, i, at):
+    """`alone_with` the road user after the one whose ways end before `at`; where to look for the next, too."""
+    end = at
+    while end < len(scene.threats) and scene.threats[end].user == i:
+        end += 1
+    if end == at:
+        return alone_with(scene, i), at
+    return Scene(scene.paths, scene.track, scene.threats[at:end], scene.table, scene.drift), end
+
+
+@inner
+def may_meet(scene):
+    """May one of these ways ever meet the ego, for all that is noted of them?"""
+    for k in range(len(scene.threats)):
+        threat = scene.threats[k]
+        if threat.free_until != NEVER and not threat.ignored:
+            return True
+    return False
+
+
 @apart
 def plans_and_duty(scene, i, a):
     """Kinds of plans that stay clear of one road user from this sample on, and does the ego do its duty toward it?"""

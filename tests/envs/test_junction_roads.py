@@ -42,6 +42,16 @@ def test_every_lane_of_a_ring_leads_to_every_exit(lanes):
             assert ends == {"exr", "nxr", "wxr", "sxr"}
 
 
+def test_who_changes_lanes_may_come_to_every_lane_of_the_roads_that_follow():
+    env = make(GENERIC, shield=None, config={"roundabout_lanes": 3})
+    env.reset(seed=0)
+    junction, graph = junction_of(env.unwrapped.road.network), env.unwrapped.road.network.graph
+    for index, k in junction.number.items():
+        roads = {index[:2], *(lane[:2] for lane, j in junction.number.items() if junction.following[k] >> j & 1)}
+        expected = {(*road, i) for road in roads for i in range(len(graph[road[0]][road[1]]))}
+        assert {lane for lane, j in junction.number.items() if junction.reachable[k] >> j & 1} == expected
+
+
 @pytest.mark.parametrize("lanes", [6, 8])
 def test_more_lanes_than_sets_hold_are_refused(lanes):
     with pytest.raises(ValueError, match=rf"road network with {8 * lanes + 16} lanes: expected at most 63"):

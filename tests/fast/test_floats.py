@@ -9,9 +9,10 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from highway_env import utils
 from llvmlite.binding import get_host_cpu_features
 
-from rss_shield.envs._numpy.floats import dot, norm
+from rss_shield.envs._numpy.floats import dot, norm, wrap_to_pi
 
 KERNELS = {"": "", "Haswell": "avx2", "SkylakeX": "avx512f"}  # of numpy's linear algebra library: what they need
 VECTORS = np.random.default_rng(1).normal(size=(1000, 2, 2)) * 10.0
@@ -48,3 +49,12 @@ def test_another_rounding_would_be_noticed():
     fused = np.array([float(Fraction(a[1]) * Fraction(b[1]) + Fraction(a[0] * b[0])) for a, b in VECTORS])
     plain = (VECTORS[:, 0] * VECTORS[:, 1]).sum(axis=1)
     assert (fused != plain).sum() > 100
+
+
+def test_angles_are_wrapped_as_highway_env_does_to_the_last_bit():
+    """In range, up to a turn out of it, further out, and at the edges and their neighbours."""
+    edges = np.arange(-8, 9) * np.pi
+    edges = np.concatenate([edges, np.nextafter(edges, np.inf), np.nextafter(edges, -np.inf)])
+    angles = np.concatenate([np.random.default_rng(0).uniform(-30.0, 30.0, 20_000), edges, edges - np.pi])
+    wrap = numba.njit(lambda angle: wrap_to_pi(angle))
+    assert np.array([wrap(angle) for angle in angles]).tobytes() == utils.wrap_to_pi(angles).tobytes()

@@ -110,6 +110,16 @@ def test_a_car_may_wait_only_before_the_first_path_it_would_block(paths):
     assert 97.5 < crossed.min() < 104.0 and 115.0 < crossed.max() < 125.0
 
 
+def test_the_next_place_where_nobody_may_wait_is_the_first_one_ahead(paths):
+    ends = 0
+    for p, crossed in enumerate(paths.crossed):
+        ahead = [np.flatnonzero(crossed[c:]) for c in range(len(crossed))]
+        expected = [c + found[0] if len(found) else len(crossed) for c, found in enumerate(ahead)]
+        assert paths.line[p].tolist() == expected
+        ends += expected.count(len(crossed))
+    assert ends > 0
+
+
 def test_ring_roads_are_left_at_every_exit_and_have_the_right_of_way():
     ring = junction("roundabout-v0")
     sinks = {walk[-1][1] for walk in ring.walks}
