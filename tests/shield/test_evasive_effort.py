@@ -80,7 +80,7 @@ def test_it_does_not_squeeze_who_is_there():
 
 
 def test_it_does_not_swerve_in_front_of_who_comes_the_other_way():
-    # one lane to the left, 60 m ahead, 20 m/s: the next 2 m to that side are his, and within the lane there is no way out
+    # one lane to the left, 60 m ahead, 20 m/s: 2 m to that side are his, and within the lane is no way out
     coming = user(60.0, -3.0, 20.0)
     coming["cos"], coming["along"] = -1.0, -20.0
     assert not effort([ahead_and_aside(1.7), (coming, remembered(0))]).changed
