@@ -34,6 +34,7 @@ STYLE: Any = {
     "pdf.fonttype": 42,  # text stays text
     "savefig.dpi": 200,
 }
+MANY = 4  # cells whose bars have room for names below them
 BINS = 10  # points of a learning curve, at most
 UNFINISHED = 0.05  # a point is drawn where at most this share of the episodes has an unknown end
 
@@ -70,7 +71,7 @@ def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
     edges = np.linspace(0, max(curve["timesteps"].max(), 1) if len(curve) else 1, BINS + 1)
     bins = {arm: joined_bins(rows, edges) for arm, rows in curve.groupby("arm", sort=False)}
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(6.5, 4.6))
+        figure = Figure(figsize=(6.5, 4.2 + 0.08 * len(bins)))
         for axes, (name, values, statistic) in zip(figure.subplots(2, 2, sharex=True).flat, panels, strict=True):
             for arm, rows in curve.groupby("arm", sort=False):
                 label = f"{arm} (n = {len(rows)} episodes, {seeds_text(rows['train_seed'].nunique())})"
@@ -80,8 +81,11 @@ def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
                 ]
                 _line(axes, points, label, str(arm))
             label_over_training(axes, name, share=name != "Return per episode")
+            if name.startswith("Frames"):  # often a percent or two, which from 0 to 100 % looks like nothing
+                axes.autoscale(axis="y")
+                axes.set_ylim(bottom=0.0)
         handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=7)  # long names fit side by side
         explained = (
             "point: all episodes begun in its bin, those cut off weighted in; band: 95 % interval over these episodes"
         )
@@ -101,7 +105,8 @@ def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
     """
     cells = list(episodes.groupby(["train", "test"], sort=False))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(max(6.5, 1.2 * len(cells)), 4.0))
+        many = len(cells) > MANY
+        figure = Figure(figsize=(max(6.5, (0.6 if many else 1.2) * len(cells)), 4.6 if many else 4.0))
         axes = figure.subplots()
         tops = np.zeros(len(cells))
         for blame in BLAMES:
@@ -121,10 +126,12 @@ def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
             at_fault = cell["blame"].isin(AT_FAULT)
             _whisker(axes, i - 0.12, wilson(int(at_fault.sum()), len(cell)))
             _whisker(axes, i + 0.12, wilson(int(cell["crashed"].sum()), len(cell)))
-        axes.set_xticks(
-            range(len(cells)),
-            [f"training: {train}\ntesting: {test}\nn = {len(cell)}" for (train, test), cell in cells],
-        )
+        if many:  # their names are long and would cover each other
+            names = [f"{train} / {test}, n = {len(cell)}" for (train, test), cell in cells]
+            axes.set_xticks(range(len(cells)), names, rotation=40, ha="right", rotation_mode="anchor", size=7)
+        else:
+            names = [f"training: {train}\ntesting: {test}\nn = {len(cell)}" for (train, test), cell in cells]
+            axes.set_xticks(range(len(cells)), names)
         axes.set_xlabel("Shield in training and in testing, test episodes")
         axes.set_ylabel("Test episodes with a crash")
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))

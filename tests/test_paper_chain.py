@@ -12,6 +12,8 @@ from bench.campaign import PLANS
 from rss_shield.eval.paper import sweeps
 from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.runs.experiment import experiment_of
+from rss_shield.eval.runs.points import metric_named
+from rss_shield.eval.runs.tables import labels_of
 from rss_shield.eval.suite.sweep import with_episodes
 
 VERSIONS = {
@@ -122,6 +124,12 @@ def test_the_page_of_sweeps_has_the_front_in_words_and_in_a_picture(swept, tmp_p
     assert "znver4, 2 cores, Linux. Seeds 0; test episodes from 7, 40 each." in text
     assert (tmp_path / "out" / "sweeps-tables.png").stat().st_size > 10_000
     assert len(records_of([swept, tmp_path])) == 1
+
+
+def test_points_that_nearly_coincide_share_a_label():
+    points = pd.DataFrame({"preset": ["a", "b", "c"], "crash": [0.1, 0.1, 0.5], "return": [20.0, 20.1, 30.0]})
+    labels = labels_of(points, ["preset"], metric_named("return"), metric_named("crash"))
+    assert labels == [((20.0, 10.0), "a, b"), ((30.0, 50.0), "c")]
 
 
 def test_a_sweep_that_is_not_finished_is_named(tmp_path):

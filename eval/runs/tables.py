@@ -124,12 +124,38 @@ def _panel(plot: Axes, table: pd.DataFrame, axes: list[str], safety: str, perfor
         plot.errorbar(x.scale * rows[x.name], y.scale * rows[y.name], **style)
     front = table[table["front"]].sort_values([x.name, y.name])
     plot.plot(x.scale * front[x.name], y.scale * front[y.name], color=FRONT, linewidth=0.8)
-    for _, row in front.drop_duplicates([x.name, y.name]).iterrows():
-        text = "\n".join(_plain(row[name]) for name in axes)
-        place = (x.scale * row[x.name], y.scale * row[y.name])
+    for place, text in labels_of(front, axes, x, y):
         plot.annotate(text, place, textcoords="offset points", xytext=(4, 4), fontsize=6)
     plot.set_xlabel(f"{x.label} [{x.unit}]" if x.unit else x.label)
     plot.set_ylabel(f"{y.label} [{y.unit}]" if y.unit else y.label)
+
+
+NEAR = 0.04  # of what a panel shows: labels that are nearer than this in both directions would cover each other
+
+
+def labels_of(front: pd.DataFrame, axes: list[str], x: Metric, y: Metric) -> list[tuple[tuple[float, float], str]]:
+    """Where to write what on a panel; points that nearly coincide share a place, one line for each.
+
+    Args:
+      front: a row per point.
+      axes: columns that tell points apart.
+    """
+    ends = [(front[metric.name].min(), front[metric.name].max()) for metric in (x, y)]
+    span = [max(high - low, 1e-12) for low, high in ends]
+    places: list[tuple[tuple[float, float], list[str]]] = []
+    for _, row in front.iterrows():
+        here, text = (float(row[x.name]), float(row[y.name])), "\n".join(_plain(row[name]) for name in axes)
+        near = [
+            texts
+            for there, texts in places
+            if all(abs(a - b) <= NEAR * s for a, b, s in zip(here, there, span, strict=True))
+        ]
+        if near:
+            near[0].append(text)
+        else:
+            places.append((here, [text]))
+    joint = ", " if len(axes) == 1 else "\n"
+    return [((x.scale * a, y.scale * b), joint.join(dict.fromkeys(texts))) for (a, b), texts in places]
 
 
 def _reach(rows: pd.DataFrame, metric: Metric) -> np.ndarray:
