@@ -125,6 +125,10 @@ def test_who_follows_may_speed_up_to_the_cap():
     assert _top(threat(v=3.0), 0.5, OTHER) == pytest.approx(6.0)
     assert _top(threat(v=3.0), 5.0, OTHER) == pytest.approx(10.0)
     assert _top(threat(v=12.0), 5.0, OTHER) == pytest.approx(12.0)
+    # who is counted on to stand for 2 s creeps at 0.5 m/s until then
+    assert _top(threat(stands_for=2.0), 1.0, OTHER) == pytest.approx(0.5)
+    assert _top(threat(stands_for=2.0), 3.0, OTHER) == pytest.approx(6.5)
+    assert farthest(threat(stands_for=2.0), 3.0, OTHER) == pytest.approx(50.0 + (1.0 + 3.5) * 1.05)
 
 
 # ---------------------------------------------------------------- memory
