@@ -321,7 +321,7 @@ def test_in_a_bend_a_heading_up_to_that_at_the_rear_axle_commits_to_nothing():
 
 
 def test_where_frames_are_long_the_heading_is_set_for_the_speed_to_come():
-    # 29 m/s in a bend of 150 m, G = 2.32: the lane turns by 5.8 / 150; at 29.6 m/s the idle heading is (2.96 - 2.5) / 150
+    # 29 m/s in a bend of 150 m, G = 2.32: the lane turns by 5.8 / 150; idle at 29.6 m/s is (2.96 - 2.5) / 150
     body, ego = Body(2.5, 0.7, 1 / 150, -2.5 / 150, 5.8 / 150, 0.4 / 150), car(0.0, 29.0, heading=-0.005)
     none = always_on(ego, TABLE.ego, TABLE.rules, DT)._replace(left=9.0, right=9.0, left_next=0.0, right_next=0.0)
     for wish in (-0.1, 0.1):
