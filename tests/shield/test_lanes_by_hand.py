@@ -302,8 +302,9 @@ def test_steering_is_limited_by_the_lateral_speed_and_by_the_heading_it_leads_to
     none = bounds._replace(left=0.0, right=0.0, left_next=0.0, right_next=0.0)
     assert restrict(Command(0.0, 0.3 * side), none, ego, BODY, TABLE.rules, DT).slip == pytest.approx(0.0)
     # a car that drives at an angle straightens: the course is along the lane at once
-    turned = car(0.0, 10.0, heading=0.05 * side, sin=np.sin(0.05 * side))
-    assert restrict(Command(0.0, 0.0), none, turned, BODY, TABLE.rules, DT).slip == pytest.approx(-0.05 * side)
+    for speed in (10.0, 12.5):  # up to G = 1
+        turned = car(0.0, speed, heading=0.05 * side, sin=np.sin(0.05 * side))
+        assert restrict(Command(0.0, 0.0), none, turned, BODY, TABLE.rules, DT).slip == pytest.approx(-0.05 * side)
     # fast enough (G = 2.4), the heading is set right first, and the lateral speed shrinks by 1 - 1 / G
     fast = car(0.0, 30.0, heading=0.01 * side, sin=np.sin(0.01 * side))
     wide = none._replace(left=0.3, right=0.3)
