@@ -443,6 +443,11 @@ def test_the_geofence_is_a_circle_around_the_mean_of_the_ends():
     assert within_geofence(X_TABLE, cars, 60.0).tolist() == [True, False]
 
 
+def test_the_centre_of_a_lopsided_junction_is_the_mean_of_its_four_ends():
+    across, up = [(0.0, 0.0), (1.0, 0.0), (10.0, 0.0)], [(5.0, -6.0), (5.0, -5.0), (5.0, 8.0)]
+    assert conflict_table([across, up], [0, 1], [0, 1]).centre == pytest.approx((5.0, 0.5))
+
+
 def test_a_single_car_has_no_zones():
     cars = scene(("0L", -20.0, 9.0))
     for name in FILTERS:

@@ -80,7 +80,7 @@ def test_it_does_not_squeeze_who_is_there():
 
 
 def test_it_does_not_swerve_in_front_of_who_comes_the_other_way():
-    # one lane to the left, 60 m ahead, 20 m/s: 2 m to that side are his, and within the lane is no way out
+    # one lane to the left, 60 m ahead, at 20 m/s: he needs that side, and within the lane there is no way out
     coming = user(60.0, -3.0, 20.0)
     coming["cos"], coming["along"] = -1.0, -20.0
     assert not effort([ahead_and_aside(1.7), (coming, remembered(0))]).changed
@@ -91,6 +91,12 @@ def test_it_does_not_swerve_in_front_of_who_comes_the_other_way():
 def test_it_does_not_leave_the_road():
     assert not effort([ahead_and_aside(1.7)], Room(0.9, 10.0)).changed
     assert effort([ahead_and_aside(1.7)], Room(1.1, 0.0)).changed
+
+
+def test_where_nothing_ends_the_danger_it_stays_as_far_away_as_it_can():
+    # at 30 m/s behind somebody at 6 m/s: with 6 m/s^2 it has got 72 m in 4 s, he 24 m, and 0.5 m are left
+    wish, _, changed = effort([(user(53.5, 0.0, 6.0), remembered(3, TOO_SHORT))], Room(0.0, 0.0), user(0.0, 0.0, 30.0))
+    assert changed and wish.acceleration == -6.0
 
 
 def test_nobody_can_do_anything_about_who_is_too_close():

@@ -169,6 +169,7 @@ def test_roles_at_the_threshold():
         ({"ego_is_rear": False}, 20.0, -6.0, KEPT, 0.0),
         ({"ego_is_rear": False}, 20.0, -6.5, TOO_HARD, 0.5),
         ({"ego_is_rear": False}, 0.0, -1.0, REVERSED, 0.2),
+        ({"ego_is_rear": True}, -0.1, 0.4, KEPT, 0.0),  # in reverse the last step is partial, too
         ({"ego_is_rear": True, "opposite": True, "in_own_lane": False}, 20.0, -2.0, TOO_WEAK, 1.0),  # in its own lane
     ],
 )
@@ -296,8 +297,9 @@ def test_steering_is_limited_by_the_lateral_speed_and_by_the_heading_it_leads_to
     none = bounds._replace(left=0.0, right=0.0, left_next=0.0, right_next=0.0)
     assert restrict(Command(0.0, 0.3 * side), none, ego, BODY, TABLE.rules, DT).slip == pytest.approx(0.0)
     # a car that drives at an angle straightens: the course is along the lane at once
-    turned = car(0.0, 10.0, heading=0.05 * side, sin=np.sin(0.05 * side))
-    assert restrict(Command(0.0, 0.0), none, turned, BODY, TABLE.rules, DT).slip == pytest.approx(-0.05 * side)
+    for speed in (10.0, 12.5):  # up to G = 1
+        turned = car(0.0, speed, heading=0.05 * side, sin=np.sin(0.05 * side))
+        assert restrict(Command(0.0, 0.0), none, turned, BODY, TABLE.rules, DT).slip == pytest.approx(-0.05 * side)
     # fast enough (G = 2.4), the heading is set right first, and the lateral speed shrinks by 1 - 1 / G
     fast = car(0.0, 30.0, heading=0.01 * side, sin=np.sin(0.01 * side))
     wide = none._replace(left=0.3, right=0.3)
@@ -312,6 +314,15 @@ def test_in_a_bend_a_heading_up_to_that_at_the_rear_axle_commits_to_nothing():
     free = always_on(ego, TABLE.ego, TABLE.rules, DT)
     none = free._replace(left=0.001, right=0.001, left_next=0.0, right_next=0.0)
     assert restrict(Command(0.0, 0.05), none, ego, body, TABLE.rules, DT).slip == 0.05
+
+
+def test_where_frames_are_long_the_heading_is_set_for_the_speed_to_come():
+    # 29 m/s in a bend of 150 m, G = 2.32: the lane turns by 5.8 / 150; idle at 29.6 m/s is (2.96 - 2.5) / 150
+    body, ego = Body(2.5, 0.7, 1 / 150, -2.5 / 150, 5.8 / 150, 0.4 / 150), car(0.0, 29.0, heading=-0.005)
+    none = always_on(ego, TABLE.ego, TABLE.rules, DT)._replace(left=9.0, right=9.0, left_next=0.0, right_next=0.0)
+    for wish in (-0.1, 0.1):
+        slip = restrict(Command(3.0, wish), none, ego, body, TABLE.rules, DT).slip
+        assert -0.005 + 2.32 * np.sin(slip) - 5.8 / 150 == pytest.approx(0.46 / 150, abs=1e-6)
 
 
 def test_in_reverse_the_lateral_speed_and_the_heading_are_limited_too():

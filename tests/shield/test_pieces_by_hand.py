@@ -115,6 +115,14 @@ def test_who_speeds_up_gets_farther_and_may_cut_its_corners_too():
     assert farthest(threat(), 4.0, OTHER) == pytest.approx(50.0 + 25 / 3 + 10.0 * (4 - 5 / 3) + 1.0)
 
 
+def test_who_waits_at_a_light_stays_behind_its_line_and_then_starts_or_comes_up_to_it():
+    # half a second after it may go, 3 m short of the line: (6 + 5) * 0.25 / 2 behind it; without the light 14.25 m
+    waits = threat(v=5.0, cap=30.0, red_for=1.0, line=53.0)
+    assert farthest(waits, 1.5, OTHER) == pytest.approx(50.0 + (3.0 + 1.375) * 1.05)
+    assert farthest(waits, 1.0, OTHER) == pytest.approx(50.0 + 3.0 * 1.05)
+    assert farthest(threat(v=5.0, cap=30.0), 1.5, OTHER) == pytest.approx(50.0 + 14.25 * 1.05)
+
+
 def test_a_wreck_may_stay_or_roll_on():
     # with a = -v it rolls v m in all
     assert _least(threat(v=4.0, wreck=True), 3.0, OTHER) == 50.0
@@ -125,6 +133,10 @@ def test_who_follows_may_speed_up_to_the_cap():
     assert _top(threat(v=3.0), 0.5, OTHER) == pytest.approx(6.0)
     assert _top(threat(v=3.0), 5.0, OTHER) == pytest.approx(10.0)
     assert _top(threat(v=12.0), 5.0, OTHER) == pytest.approx(12.0)
+    # who is counted on to stand for 2 s creeps at 0.5 m/s until then
+    assert _top(threat(stands_for=2.0), 1.0, OTHER) == pytest.approx(0.5)
+    assert _top(threat(stands_for=2.0), 3.0, OTHER) == pytest.approx(6.5)
+    assert farthest(threat(stands_for=2.0), 3.0, OTHER) == pytest.approx(50.0 + (1.0 + 3.5) * 1.05)
 
 
 # ---------------------------------------------------------------- memory
