@@ -24,6 +24,8 @@ def provenance(records: Sequence[dict[str, Any]]) -> str:
     lines = []
     for record in records:
         versions = record.get("versions", record)
+        if "git_commit" not in versions:  # a run that has not recorded any
+            continue
         code = str(versions["git_commit"] or "without a commit")[:12]
         changed = ", changed by hand" if versions["git_changes"] else ""
         packages = ", ".join(f"{name} {versions['packages'][name]}" for name in SHOWN if versions["packages"].get(name))
@@ -38,7 +40,7 @@ def provenance(records: Sequence[dict[str, Any]]) -> str:
 
 def _seeds(record: dict[str, Any]) -> str:
     options = record.get("config") or record.get("experiment") or {}
-    if "seeds" not in options:
+    if "seeds" not in options or not {"test_seeds", "tests"} & set(options):
         return ""
     told = f"Seeds {_listed(options['seeds'])}"
     if "test_seeds" in options:

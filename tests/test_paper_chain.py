@@ -93,6 +93,7 @@ def test_a_page_says_code_machine_and_seeds_once():
         "Code 0123456789ab; Python 3.12.1, numpy 2.4.6; znver4, 2 cores, Linux. "
         "Seeds 0 to 2; test episodes 5 to 9. Seeds 0, 4; test episodes 5 to 9."
     )
+    assert provenance([{"config": {"seeds": [0]}}]) == ""
     old = {name: value for name, value in VERSIONS.items() if name != "cores"} | {"git_changes": "abc"}
     assert provenance([old]) == "Code 0123456789ab, changed by hand; Python 3.12.1, numpy 2.4.6; znver4, Linux."
 
