@@ -21,7 +21,8 @@ td small { display: block; color: #555; }
 th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid #ddd; white-space: nowrap; }
 td:first-child, th:first-child { text-align: left; } thead th { border-bottom: 2px solid #555; white-space: normal; }
 tbody tr:nth-child(even) { background: #f6f8fa; }
-figure { margin: 1.5rem 0; } figure img { max-width: min(100%, 54rem); height: auto; } figcaption, caption { color: #444;
+figure { margin: 1.5rem 0; } figure img { max-width: min(100%, 54rem); height: auto; }
+figcaption, caption { color: #444;
   font-size: .85rem; text-align: left; } caption { caption-side: bottom; padding-top: .3rem; }
 pre { background: #f6f8fa; padding: .6rem; overflow-x: auto; font-size: .85rem; }
 @media print { body { max-width: none; margin: 0; font-size: 11px; } h2 { break-before: page; } nav { display: none; }
