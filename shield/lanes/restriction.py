@@ -115,7 +115,7 @@ def _idle_headings(body, v, v_next, dt):
     On a straight lane that is 0. In a bend a car which keeps to it turns about its rear axle, whose lane has another
     heading: anything up to that is harmless, because the next slip sets the lateral speed as it should be. No longer so
     once the heading has to be set instead (`_straightening_slip`): what counts then is the very heading that keeps the
-    car to the lane frame by frame (`shield.lanes.frame.Bend.idle`), and it is on the other side (hole C9).
+    car to the lane frame by frame (`shield.lanes.frame.Bend.idle`), and it is on the other side (C9).
     """
     if v_next * dt < _HEADING_FIRST * body.half_wheelbase:
         return min(body.slack, 0.0), max(body.slack, 0.0)

@@ -39,7 +39,9 @@ def killed_again_and_again(work, done, pieces, per_piece, rng):
     """At twenty random moments, each up to `pieces` pieces of work after the one before.
 
     Moments are counted in pieces that are done, so a machine that becomes faster or slower meanwhile does not matter.
+    On one that is very busy the work may run ahead and be done too early: returns how many were killed.
     """
+    killed = 0
     for _ in range(KILLS):
         wanted, later = done() + int(rng.integers(pieces)), rng.uniform(0.0, per_piece)
 
@@ -49,7 +51,8 @@ def killed_again_and_again(work, done, pieces, per_piece, rng):
                 time.sleep(0.002)
             time.sleep(later)
 
-        assert in_a_child(work, until)
+        killed += in_a_child(work, until)
+    return killed
 
 
 def count(folder, pattern):
@@ -73,12 +76,12 @@ def test_a_campaign_of_stress(tmp_path, capsys, seed):
     per_piece = (time.perf_counter() - began) / episodes
 
     folder = tmp_path / "killed"
-    killed_again_and_again(
+    killed = killed_again_and_again(
         lambda: stress.run([*few, "--out", str(folder)]),
         lambda: count(folder, "[!.]*.json"),
         *(5, per_piece, np.random.default_rng(seed)),
     )
-    assert count(folder, "[!.]*.json") < episodes  # never too late
+    assert killed >= KILLS // 2
     stress.run([*few, "--out", str(folder)])
     assert capsys.readouterr().out.splitlines()[-4:] == said
     assert said[0].startswith(f"{episodes} episodes")
@@ -86,7 +89,7 @@ def test_a_campaign_of_stress(tmp_path, capsys, seed):
 
 
 def test_a_sweep(tmp_path):
-    tasks = 70
+    tasks = 90
     grid = {"rules.anticipation": [round(0.1 * k, 1) for k in range(tasks)]}
     tiny = {
         "name": "tiny",
@@ -100,7 +103,7 @@ def test_a_sweep(tmp_path):
     def work(config):
         if not known:
             known.update(do_task(config))
-        time.sleep(0.01)
+        time.sleep(0.03)
         with open(tmp_path / "done.txt", "a") as file:  # a line per task that was worked on
             file.write(f"{config['options']['rules.anticipation']}\n")
         return dict(known)
@@ -113,12 +116,12 @@ def test_a_sweep(tmp_path):
     per_piece = (time.perf_counter() - began) / tasks
     (tmp_path / "done.txt").unlink()
 
-    killed_again_and_again(
+    killed = killed_again_and_again(
         lambda: sweep(experiment, folder, work),
         lambda: count(folder / "tasks", "[!.]*.csv"),
         *(3, per_piece, np.random.default_rng(1)),
     )
-    assert count(folder / "tasks", "[!.]*.csv") < tasks
+    assert killed >= KILLS // 2
     done = sweep(experiment, folder, work)
     assert not done.failed and len(done.tasks) == len(whole.tasks) == tasks
     assert contents(folder / "tasks", "[!.]*.csv") == contents(tmp_path / "whole" / "tasks", "[!.]*.csv")
@@ -126,4 +129,4 @@ def test_a_sweep(tmp_path):
     # a task may be begun again if it was killed between the work and the file, but no more often than that
     lines = (tmp_path / "done.txt").read_text().splitlines()
     assert set(lines) == {str(value) for value in grid["rules.anticipation"]}
-    assert len(lines) <= tasks + KILLS
+    assert len(lines) <= tasks + killed

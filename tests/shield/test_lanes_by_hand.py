@@ -321,8 +321,9 @@ def test_where_frames_are_long_the_heading_is_set_for_the_speed_to_come():
     body, ego = Body(2.5, 0.7, 1 / 150, -2.5 / 150, 5.8 / 150, 0.4 / 150), car(0.0, 29.0, heading=-0.005)
     none = always_on(ego, TABLE.ego, TABLE.rules, DT)._replace(left=9.0, right=9.0, left_next=0.0, right_next=0.0)
     for wish in (-0.1, 0.1):
-        slip = restrict(Command(3.0, wish), none, ego, body, TABLE.rules, DT).slip
-        assert -0.005 + 2.32 * np.sin(slip) - 5.8 / 150 == pytest.approx(0.46 / 150, abs=1e-6)
+        for a, idle in ((3.0, 0.46 / 150), (-5.0, 0.3 / 150)):  # and (2.8 - 2.5) / 150 at 28 m/s
+            slip = restrict(Command(a, wish), none, ego, body, TABLE.rules, DT).slip
+            assert -0.005 + 2.32 * np.sin(slip) - 5.8 / 150 == pytest.approx(idle, abs=1e-6)
 
 
 def test_in_reverse_the_lateral_speed_and_the_heading_are_limited_too():
