@@ -2,6 +2,7 @@
 
 import numpy as np
 from highway_env.envs.common.action import MultiAgentAction
+from highway_env.envs.common.observation import MultiAgentObservation
 from highway_env.road.lane import AbstractLane
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.utils import class_from_path
@@ -45,8 +46,9 @@ def show(env, cars: np.ndarray, network: Network, episode: np.ndarray | None = N
         agents = own or agents
         for kind, vehicle in zip(env.action_type.agents_action_types, agents, strict=True):
             kind.controlled_vehicle = vehicle
-    for kind, vehicle in zip(getattr(env.observation_type, "agents_observation_types", ()), agents, strict=True):
-        kind.observer_vehicle = vehicle
+    if isinstance(env.observation_type, MultiAgentObservation):
+        for kind, vehicle in zip(env.observation_type.agents_observation_types, agents, strict=True):
+            kind.observer_vehicle = vehicle
     env.controlled_vehicles = agents
     env.observation_type.observer_vehicle = env.action_type.controlled_vehicle = agents[0]
     if episode is not None:

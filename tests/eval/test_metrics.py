@@ -15,7 +15,8 @@ MEASURED = (
     *("frozen", "near_misses", "impact", "impact_delta_v", "min_thw_ahead", "max_drac_ahead", "min_pet"),
     *("violation_ego", "violation_other", "shield_time"),
 )
-ALWAYS = [metric.name for metric in METRICS if metric.name not in (*OF_A_GOAL, *RISK, *MEASURED)]
+OWN = ["own_return"]  # where there is a reward of one's own
+ALWAYS = [metric.name for metric in METRICS if metric.name not in (*OF_A_GOAL, *RISK, *MEASURED, *OWN)]
 OUTCOMES = ["", "ego", "both", "other", "inherited", "none"]
 
 
@@ -77,7 +78,7 @@ def crossings_of(times: list[float], successes: list[bool], test: str = "off") -
 
 def test_the_time_to_the_goal_is_that_of_the_episodes_that_reach_it():
     summary = summarise(crossings_of([6.0, 13.0, 8.0, 13.0], [True, False, True, False])).set_index("metric")
-    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in (*RISK, *MEASURED)]
+    assert list(summary.index) == [metric.name for metric in METRICS if metric.name not in (*RISK, *MEASURED, *OWN)]
     assert summary.loc["success", ["value", "n"]].tolist() == [0.5, 4]
     assert summary.loc["time_to_goal", ["value", "n"]].tolist() == [7.0, 2]  # mean of 6 and 8
 
