@@ -12,13 +12,12 @@ from rss_shield.eval.suite import stress
 from rss_shield.eval.suite.sweep import do_task, sweep
 
 KILLS = 20
-LATEST = 120.0  # [s]
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 
 
-def in_a_child(work, until=None):
-    """Do something in another process, which is killed at a moment: as soon as `until` returns. Was it?"""
+def in_a_child(work, ready=None, later=0.0):
+    """Do something in another process, which is killed some seconds after it is `ready`. Was it, before it was done?"""
     child = os.fork()
     if child == 0:
         silence = os.open(os.devnull, os.O_WRONLY)
@@ -28,8 +27,12 @@ def in_a_child(work, until=None):
             work()
         finally:
             os._exit(0)
-    if until is not None:
-        until()
+    if ready is not None:
+        while not ready():
+            if os.waitpid(child, os.WNOHANG)[0]:
+                return False
+            time.sleep(0.002)
+        time.sleep(later)
         os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
     return os.WIFSIGNALED(status)
@@ -44,19 +47,12 @@ def killed_again_and_again(work, done, pieces, per_piece, rng):
     killed = 0
     for _ in range(KILLS):
         wanted, later = done() + int(rng.integers(pieces)), rng.uniform(0.0, per_piece)
-
-        def until(wanted=wanted, later=later):
-            latest = time.monotonic() + LATEST
-            while done() < wanted and time.monotonic() < latest:
-                time.sleep(0.002)
-            time.sleep(later)
-
-        killed += in_a_child(work, until)
+        killed += in_a_child(work, lambda wanted=wanted: done() >= wanted, later)
     return killed
 
 
 def count(folder, pattern):
-    return sum(1 for _ in folder.glob(pattern))
+    return sum(1 for _ in folder.rglob(pattern))
 
 
 def contents(folder, pattern):
