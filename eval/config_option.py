@@ -13,6 +13,7 @@ from rss_shield.eval.files import plainly, to_json
 
 PREFIX, HYPERPARAMETERS = "--config.", "--hyperparameters."
 EXAMPLES = {PREFIX: "lanes-count 4", HYPERPARAMETERS: "gamma 0.95"}
+FILES = (".json", ".toml", ".yaml", ".yml")  # how the names of what can be read end
 Keys = tuple[str, ...]  # of a nested value: ("observation", "type")
 
 
@@ -29,7 +30,7 @@ def read_config(text: str) -> dict[str, Any]:
         return _object(text, _parsed(text, "json", "JSON"))
     path = Path(text)
     kind = path.suffix.lower().lstrip(".")
-    if kind not in ("json", "toml", "yaml", "yml"):
+    if path.suffix.lower() not in FILES:
         raise ValueError(f"{text}: expected a file .json, .toml, .yaml or .yml, or JSON itself")
     try:
         content = path.read_text(encoding="utf-8")

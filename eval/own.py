@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-FILES = (".json", ".toml", ".yaml", ".yml")
+from rss_shield.eval.config_option import FILES
+
 Driver = Callable[[np.ndarray], np.ndarray]
 
 

@@ -6,7 +6,6 @@
 Writes OUT/index.html (self-contained), report.md, report.tex, and figures/RUN/*.png and .pdf. Nothing is trained.
 """
 
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ import tyro
 
 from rss_shield.eval.paper.read import across_roads, section_of
 from rss_shield.eval.paper.render import write_report
+from rss_shield.eval.provenance import records_of
 
 
 @dataclass(frozen=True)
@@ -49,20 +49,16 @@ def footer(runs: tuple[Path, ...]) -> str:
     """From which code, versions and machines the numbers are."""
     lines = []
     for run in runs:
-        for name in ("config.json", "experiment.json"):
-            if (run / name).exists():
-                record = json.loads((run / name).read_text(encoding="utf-8"))
-                versions = record.get("versions", record)
-                packages = ", ".join(
-                    f"{package} {version}" for package, version in versions["packages"].items() if version
-                )
-                code = f"{versions['git_commit']}{' with changes' if versions['git_changes'] else ''}"
-                cores = f", {versions['cores']} cores" if "cores" in versions else ""
-                lines += [
-                    f"{run.name}: code {code}; Python {versions['python']}; {versions['platform']}; "
-                    f"{versions['cpu']}{cores}"
-                ]
-                lines += [f"  {packages}"]
+        for record in records_of([run]):
+            versions = record.get("versions", record)
+            packages = ", ".join(f"{package} {version}" for package, version in versions["packages"].items() if version)
+            code = f"{versions['git_commit']}{' with changes' if versions['git_changes'] else ''}"
+            cores = f", {versions['cores']} cores" if "cores" in versions else ""
+            lines += [
+                f"{run.name}: code {code}; Python {versions['python']}; {versions['platform']}; "
+                f"{versions['cpu']}{cores}",
+                f"  {packages}",
+            ]
     return "\n".join(lines)
 
 

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from rss_shield.eval.config_option import read_config
-from rss_shield.eval.own import FILES
+from rss_shield.eval.config_option import FILES, read_config
 from rss_shield.eval.runs.names import check_names
 from rss_shield.shield.params import PRESETS, Preset, RSSParams, with_parameters
 
