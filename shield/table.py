@@ -18,3 +18,13 @@ def table_for(params: Preset, rules: Rules, dt: float) -> Table:
     ego = params.ego._replace(response_time=float(frames_for(max(rho, dt), dt) * dt))
     other = params.other._replace(response_time=float(frames_for(params.other.response_time, dt) * dt))
     return Table(ego, other, rules, dt)
+
+
+def below(table: Table, limit: float) -> Table:
+    """The same table where nobody accelerates beyond the highest speed limit of the roads [m/s] (rule J13).
+
+    What plans through junctions expect of others, the judge has to hold them to; and the ego keeps it, too, because
+    other egos expect it.
+    """
+    ego, other = (one._replace(v_cap=min(one.v_cap, limit)) for one in (table.ego, table.other))
+    return table._replace(ego=ego, other=other)

@@ -77,7 +77,7 @@ from rss_shield.shield.ground import Ground
 from rss_shield.shield.junctions.memory import CROSSING
 from rss_shield.shield.params import PRESETS, Rules
 from rss_shield.shield.risk import RiskSettings
-from rss_shield.shield.table import table_for
+from rss_shield.shield.table import below, table_for
 from rss_shield.shield.tally import start_decision
 
 DISABLED, SAME_STEP, NEXT_STEP = range(3)  # when an ended episode is followed by a new one
@@ -440,6 +440,7 @@ class Engine:
             risks = None if risk is None else np.zeros(num_envs, RISK)
         if settings is not None and settings.scheme == PLANS:
             ways = compile_ways(network, net, float(scenario.config["dt"][0]))
+            self.settings = settings._replace(table=below(settings.table, ways.roads.limit))
             crossings = np.zeros((num_envs, n), CROSSING)
         elif settings is not None:
             frames = compile_lane_frames(network, settings, ground)

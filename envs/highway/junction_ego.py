@@ -20,6 +20,7 @@ from rss_shield.shield.junctions.judge import judge_crossing
 from rss_shield.shield.junctions.memory import CAUTIOUS, CROSSING, PLAN, SAMPLE
 from rss_shield.shield.junctions.plans import NEVER, Scene, Track
 from rss_shield.shield.junctions.reach import THREAT
+from rss_shield.shield.table import below
 from rss_shield.shield.tally import count_change, note_executed
 from rss_shield.shield.verdicts import Verdict
 
@@ -32,6 +33,7 @@ class JunctionEgo(ShieldedEgo):
     def __init__(self, vehicle, settings: Settings, record: bool = False) -> None:
         super().__init__(vehicle, settings, record)
         self._take_sizes((size_of(vehicle.LENGTH, vehicle.WIDTH),))
+        self.settings = settings._replace(table=below(settings.table, self.junction.limit))
         self.crossings = np.zeros(0, CROSSING)
         self.samples = np.zeros(0, SAMPLE)
         self.cars = np.zeros(0, CAR_ON_ROAD)  # everybody on this sample, the ego last

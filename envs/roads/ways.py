@@ -369,7 +369,7 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
       memory: `[N]` CROSSING: a car stays on lanes that lead on from where it was, though others fit too where
         they meet.
       intent: KNOWN, STRAIGHT or ANY.
-      v_cap: speed above which nobody accelerates, whatever the limit of the lane [m/s].
+      v_cap: speed above which nobody accelerates, whatever the limit of the lane (rule J13) [m/s].
       samples: `[N]` SAMPLE, overwritten.
       threats: `[M]` THREAT, overwritten.
       box: `[6]`, room for one.
@@ -506,7 +506,7 @@ def _add(roads, track, lane, row, i, car, v_cap, threats, count, ways=_ALL):
         if count < len(threats):
             threat = threats[count]
             threat.user, threat.v = i, car.speed
-            threat.cap = min(v_cap, roads.limit)
+            threat.cap = v_cap
             threat.half_length, threat.wreck, threat.red_for = 0.5 * car.length, False, 0.0
             _put_on_path(roads, track, path, s, lane, threat)
         count += 1

@@ -31,6 +31,16 @@ def test_whoever_traps_or_rams_the_ego_is_to_blame(traffic, seed, actions, tmp_p
     assert judge_trace(trace, users=list(trace.ego_users)).verdict_of(trace.ego_users[0]) == "other"
 
 
+def test_whoever_speeds_up_beyond_the_limit_is_to_blame(tmp_path):
+    """J13: plans expect nobody to get faster than the roads allow, so once it was nobody's fault when somebody did."""
+    path, actions = tmp_path / "found.npz", "2 2 2 0 1 1 2 0 1"
+    block = Block("intersection-v0", "random", "", "override", 2_300_000, 1, "stopper")
+    assert keep_trace(block, 2_300_000, actions, path) == "other"
+    trace = load(path)
+    judgement = judge_trace(trace, users=list(trace.ego_users))
+    assert judgement.verdict_of(trace.ego_users[0]) == "other"
+
+
 def test_who_only_watches_sees_that_somebody_has_trapped_the_ego(tmp_path):
     """H24: once the judge said "none", because only a shield that acts knew that no plan was left."""
     path, kind = tmp_path / "found.npz", "bounded-mixed"

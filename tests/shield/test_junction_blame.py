@@ -7,16 +7,29 @@ from gymnasium.vector import AutoresetMode
 from highway_env.vehicle.behavior import IDMVehicle
 from junction_world import DT, EGO, TABLE, Duel, arms, crossing_pairs, junction
 
-from rss_shield import make_vec
+from rss_shield import make, make_vec
 from rss_shield.envs.roads.ways import CAR_ON_ROAD, list_threats
 from rss_shield.shield.junctions.conflict_areas import cell_of
 from rss_shield.shield.junctions.judge import judge_crossing
 from rss_shield.shield.junctions.memory import CROSSING, SAMPLE
 from rss_shield.shield.junctions.plans import ANY, Track
 from rss_shield.shield.junctions.reach import THREAT, farthest
-from rss_shield.shield.verdicts import CUT_IN, DUTIES, INHERITED, KEPT, LEFT_NO_PLAN, NOBODY, OTHER, TOO_FAR, TOO_HARD
+from rss_shield.shield.table import below
+from rss_shield.shield.verdicts import (
+    ACCELERATED,
+    CUT_IN,
+    DUTIES,
+    INHERITED,
+    KEPT,
+    LEFT_NO_PLAN,
+    NOBODY,
+    OTHER,
+    TOO_FAR,
+    TOO_HARD,
+)
 from rss_shield.shield.verdicts import EGO as AT_FAULT
 
+FASTER = DUTIES[ACCELERATED]
 EVERY_FRAME = {"policy_frequency": 15, "duration": 11 * 15}
 
 
@@ -39,6 +52,37 @@ def test_who_drives_on_where_no_way_leads_has_left_them_also_if_it_was_never_on_
     found = judge_crossing(sample, memory, False, TABLE.other, DT)
     assert found.verdict == verdict
     assert DUTIES[found.other_duty] == ("left every path it could take" if verdict == OTHER else "")
+
+
+# ---------------------------------------------------------------- speed limits
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "duty"),
+    [(9.0, 9.3, ""), (9.9, 10.0, ""), (9.9, 10.2, FASTER), (12.0, 12.0, ""), (12.0, 12.2, FASTER)],
+)
+def test_nobody_speeds_up_beyond_the_limit_of_the_roads(before, now, duty):
+    """J13. Whoever comes too fast may stay so: plans count on that."""
+    other = below(TABLE, 10.0).other
+    sample, memory = np.zeros(1, SAMPLE)[0], np.zeros(1, CROSSING)[0]
+    memory["age"], memory["items"], memory["since"] = 5, 1, 3
+    memory["speed"], sample["speed"] = before, now
+    found = judge_crossing(sample, memory, False, other, DT)
+    assert DUTIES[found.other_duty] == duty
+    assert found.verdict == (OTHER if duty else NOBODY)
+
+
+@pytest.mark.parametrize("lateral", [False, True])
+def test_an_agent_with_a_throttle_keeps_to_the_limit_of_the_roads(lateral):
+    config = {"action": {"type": "ContinuousAction", "lateral": lateral}, "duration": 8, "destination": "o2"}
+    env, fastest = make("intersection-v0", entry="assertive", config=config), 0.0
+    for seed in range(6):
+        env.reset(seed=seed)
+        over = False
+        while not over:
+            *_, terminated, truncated, _ = env.step(np.eye(1, 1 + lateral, dtype=np.float32)[0])
+            fastest, over = max(fastest, env.unwrapped.vehicle.speed), terminated or truncated
+    assert fastest == pytest.approx(10.0, abs=1e-9)
 
 
 # ---------------------------------------------------------------- flags
