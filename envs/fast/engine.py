@@ -22,6 +22,7 @@ from rss_shield.envs.fast.following import follow
 from rss_shield.envs.fast.foresight import foresee, make_desk
 from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.guard import (
+    Plans,
     Ways,
     carry_over,
     compile_ways,
@@ -36,9 +37,9 @@ from rss_shield.envs.fast.guard import (
     start_watch,
 )
 from rss_shield.envs.fast.linear_drivers import start_habits
-from rss_shield.envs.fast.neighbours import LaneFrames, Past, compile_lane_frames, make_past
+from rss_shield.envs.fast.neighbours import Distances, LaneFrames, Past, compile_lane_frames, make_past
 from rss_shield.envs.fast.rating import is_truncated
-from rss_shield.envs.fast.risk import RISK, Field, begin_looks, compile_field, meter_of, report_risk, start_risk
+from rss_shield.envs.fast.risk import RISK, Field, Meter, begin_looks, compile_field, meter_of, report_risk, start_risk
 from rss_shield.envs.fast.seats import (
     NO_ACTION,
     Seats,
@@ -58,8 +59,8 @@ from rss_shield.envs.fast.seats import (
     stop_after,
     take_actions,
 )
-from rss_shield.envs.fast.senses import GHOSTS, Sensed, aware_of, begin_episode, look, make_sensed
-from rss_shield.envs.fast.sight import make_sight, project, sort_along_x
+from rss_shield.envs.fast.senses import GHOSTS, Aware, Sensed, aware_of, begin_episode, look, make_sensed
+from rss_shield.envs.fast.sight import Sight, make_sight, project, sort_along_x
 from rss_shield.envs.fast.state import CAR, EPISODE, LINEAR_CAR, STEP, TRAFFIC
 from rss_shield.envs.fast.tasks import make_scene
 from rss_shield.envs.fast.threads import Crew
@@ -151,6 +152,21 @@ class Film(NamedTuple):
     cars: np.ndarray  # `[slots, frames, N]` CAR after each frame
 
 
+class Place(NamedTuple):
+    """One environment of a batch, and where it is worked out."""
+
+    cars: np.ndarray  # `[N]` CAR
+    episode: np.ndarray  # EPISODE
+    order: np.ndarray  # `[N]`
+    sight: Sight
+    # of the first ego, None where there is no such thing
+    distances: Distances | None
+    plans: Plans | None
+    ride: np.ndarray | None  # RIDE
+    meter: Meter | None
+    aware: Aware | None
+
+
 @rare
 def _populate(cars, episode, order, world, sight, flow):
     config, net, linear = world.config[0], world.network, world.linear
@@ -193,10 +209,9 @@ def _go_on(e, cars, episode, order, world, plans, watch, flow, seats):
 
 
 @rare
-def _restart(
-    e, cars, episode, order, world, sight, distances, plans, ride, meter, watch, step, out, aware, seats, told
-):
+def _restart(e, place, world, watch, step, out, seats, told):
     """Begin a new episode and observe it."""
+    cars, episode, order, sight, distances, plans, ride, meter, aware = place
     _populate(cars, episode, order, world, sight, world.flow)
     episode.time, episode.steps, episode.return_, episode.ended = 0.0, 0, 0.0, False
     survey(cars, episode, world.network, sight, world.flow)
@@ -246,27 +261,9 @@ def _see_apart(cars, episode, world, sight, out, aware):
 
 
 @unfolded
-def _advance(
-    e,
-    cars,
-    episode,
-    order,
-    world,
-    sight,
-    distances,
-    plans,
-    ride,
-    meter,
-    watch,
-    settings,
-    inputs,
-    film,
-    step,
-    aware,
-    seats,
-    told,
-):
+def _advance(e, place, world, watch, settings, inputs, film, step, seats, told):
     """One decision of one environment, frame by frame."""
+    cars, episode, order, sight, distances, plans, ride, meter, aware = place
     config, net, flow = world.config[0], world.network, world.flow
     lanes = net.lanes
     survey(cars, episode, net, sight, flow)
@@ -331,33 +328,15 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
             continue
         if inputs.todo[e] == RESTART or (inputs.todo[e] == DECIDE and autoreset == NEXT_STEP and episode.ended):
             _start_outputs(e, outputs)
-            places = sight, distances, plans, ride, meter
-            _restart(e, cars, episode, order, world, *places, watch, step, observation, aware, seats, told)
+            place = Place(cars, episode, order, sight, distances, plans, ride, meter, aware)
+            _restart(e, place, world, watch, step, observation, seats, told)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = DONE
             continue
         if inputs.todo[e] == DECIDE:
             _start_outputs(e, outputs)
-            cost = _advance(
-                e,
-                cars,
-                episode,
-                order,
-                world,
-                sight,
-                distances,
-                plans,
-                ride,
-                meter,
-                watch,
-                settings,
-                inputs,
-                film,
-                step,
-                aware,
-                seats,
-                told,
-            )
+            place = Place(cars, episode, order, sight, distances, plans, ride, meter, aware)
+            cost = _advance(e, place, world, watch, settings, inputs, film, step, seats, told)
             _see(cars, episode, world, sight, observation, aware)
             reward = earn(e, cars, episode, inputs.actions[e], world, sight, step, seats, told)
             step.raw_reward = reward
@@ -383,8 +362,8 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
             keep_last(e, world, seats, told)
             begin_episode(e, batch.sensed)
             aware = aware_of(e, batch.sensed, world.frames)
-            places = sight, distances, plans, ride, meter
-            _restart(e, cars, episode, order, world, *places, watch, step, observation, aware, seats, told)
+            place = Place(cars, episode, order, sight, distances, plans, ride, meter, aware)
+            _restart(e, place, world, watch, step, observation, seats, told)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = RESTART
 
