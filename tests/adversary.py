@@ -25,7 +25,6 @@ from rss_shield.shield.sampling import frames_for
 
 HALF_WHEELBASE = 2.5  # [m]
 MAX_SLIP = float(np.arctan(np.tan(np.pi / 3) / 2))  # of highway-env's steering [rad]
-BODY = Body(HALF_WHEELBASE, MAX_SLIP, curvature=0.0, slack=0.0, backs_up=True)
 MAX_SPEED = 40.0  # [m/s]
 CAR_WIDTH, OBSTACLE_SIZE = 2.0, 2.0  # [m]
 
@@ -477,6 +476,11 @@ def _as_seen(car, user, w):
 
 
 @compiled
+def _body(w):
+    return Body(HALF_WHEELBASE, MAX_SLIP, 0.0, 0.0, 0.0, 0.0, True, w.ego.a_min_brake)
+
+
+@compiled
 def _shielded(nominal, ego, seen, users, last, memory, w, result):
     """The shield's command, less what `w` takes away from it."""
     if w.forgetful:
@@ -484,7 +488,7 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
             memory[i].age = memory[i].since = memory[i].axes = 0
             memory[i].skipped = False
     danger = find_danger(seen, users, last[w.others], last, memory, Table(w.ego, w.other, w.rules, w.dt, None))
-    response = respond(nominal, danger, seen, BODY, w.rules, w.dt)
+    response = respond(nominal, danger, seen, _body(w), w.rules, w.dt)
     result.overridden += response.overridden
     result.answered_now += (danger.response & 4) != 0
     a, slip = response.command
@@ -507,7 +511,8 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
         bounds = always_on(seen, w.ego, w.rules, w.dt)
         for i in range(w.others):
             bounds = merge(bounds, memory[i], w.ego, w.rules, w.dt)
-        a, slip = restrict(nominal, bounds, seen, BODY, w.steering, w.dt)
+        body = _body(w)
+        a, slip = restrict(nominal, bounds, seen, body, w.steering, w.dt)
     return Command(a, slip)
 
 

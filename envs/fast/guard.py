@@ -313,7 +313,14 @@ def _keep_distances(cars, episode, lanes, sight, distances, watch, settings, ste
     response = Response(wish, False, False, False)
     if settings.overrides:
         body = Body(
-            car.length / 2, watch.max_slip, bend.curvature, bend.slack, bend.turned, bend.idle, car.kind == DIRECT
+            car.length / 2,
+            watch.max_slip,
+            bend.curvature,
+            bend.slack,
+            bend.turned,
+            bend.idle,
+            car.kind == DIRECT,
+            settings.table.ego.a_min_brake,
         )
         if others_act:
             response = _answer(wish, car, danger, episode, sight, distances, body, settings, step)

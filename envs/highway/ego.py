@@ -214,7 +214,15 @@ class ShieldedEgo:
         self.rooms = danger.room_left, danger.room_right
         response = Response(wish, False, False, False)
         if settings.overrides:
-            body = Body(*self.body, bend.curvature, bend.slack, bend.turned, bend.idle, self.backs_up)
+            body = Body(
+                *self.body,
+                bend.curvature,
+                bend.slack,
+                bend.turned,
+                bend.idle,
+                self.backs_up,
+                settings.table.ego.a_min_brake,
+            )
             response = self._respond(wish, danger, ego, users, body)
         command = response.command
         pairs, broken = judge_frame(ego, users, self.memory, command, bend.curvature, settings.table)

@@ -16,7 +16,6 @@ from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.look_ahead import Caps, LookAhead, anticipate, look_ahead_at, look_ahead_of, may_bind_for
 from rss_shield.shield.lanes.memory import Bounds, catch_up, hold, may_back_up, merge, remember, response_to
 from rss_shield.shield.lanes.pair import STANDSTILL, assess, leading_speed, least_cosine
-from rss_shield.shield.lanes.responses import RESPONSE_STEER
 from rss_shield.shield.lanes.restriction import restrict
 from rss_shield.shield.sampling import reach_from_rest, slowest_in_danger
 
@@ -47,7 +46,6 @@ class Response(NamedTuple):
 
 
 _SAFE_BEYOND_DOUBT = 1e-6  # margin of a pair that is far apart: more than rounding can change [m]
-_STRAIGHT = 1.0 / 1.2  # times the heading bound: turned farther, who owes a lateral stop does not back up
 
 
 @compiled
@@ -103,10 +101,7 @@ def find_danger(
             rooms = beside(rooms, pair, ego, user, table.ego, dt)
         if known.since > 0:
             dangerous = True
-            owed = response_to(known, rules)
-            response |= owed
-            if owed & RESPONSE_STEER and abs(ego.sin) > _STRAIGHT * rules.heading_bound:
-                bounds = hold(bounds, held)
+            response |= response_to(known, rules)
         if rules.limits and (not may_back_up(known, pair) or (user.vague and known.since > 0)):
             bounds = hold(bounds, held)
         margin = max(pair.margin_lon, pair.margin_lat)

@@ -7,8 +7,6 @@ from rss_shield.shield.lanes.memory import Bounds
 from rss_shield.shield.lanes.pair import STANDSTILL, toward
 from rss_shield.shield.sampling import slowest_in_danger
 
-_CROOKED = 1.2  # times the heading bound: a car turned farther than this does not back up
-
 
 @compiled
 def always_on(ego, params, rules, dt):
@@ -26,9 +24,18 @@ def always_on(ego, params, rules, dt):
 def _slowest(ego, params, rules, dt):
     """Least speed after this frame where nobody is behind [m/s]: one that stands may back up slowly, if it is straight.
 
-    Backwards its wheels cannot both keep it from moving sideways and turn it straight.
+    Backwards its wheels cannot both keep it from moving sideways and turn it straight, so it turns farther on the way:
+    it goes no faster than lets it come to rest inside the heading bound (`straight_enough`).
     """
     held = slowest_in_danger(ego.speed, params, dt)
-    if ego.speed > STANDSTILL or ego.cos <= 0.0 or abs(ego.sin) > _CROOKED * rules.heading_bound:
+    if ego.speed > STANDSTILL or ego.cos <= 0.0:
         return held
-    return min(max(ego.speed - params.a_max_accel * dt, -rules.reverse_speed), held)
+    slowest, b = -rules.reverse_speed, params.a_min_brake
+    if rules.heading_bound < 1.0:
+        half_wheelbase = ego.half_length - rules.heading_bound * ego.half_width  # or less
+        turned = max(abs(ego.sin), 1e-9) / rules.heading_bound
+        room = min(ego.speed, 0.0) * dt - half_wheelbase * np.log(turned)  # way that is left after this frame
+        if room <= 0.0:
+            return held
+        slowest = max(slowest, -min(room / dt, max(np.sqrt(2 * b * room) - 0.5 * b * dt, b * dt)))
+    return min(max(ego.speed - params.a_max_accel * dt, slowest), held)

@@ -10,6 +10,8 @@ from rss_shield.shield.lanes.frame import outside
 from rss_shield.shield.lanes.pair import STANDSTILL
 
 _STEEP = 1.5  # steeper angles to the lane are left to the exact solution [rad]
+_JUST_BELOW = 1.0 - 1e-9
+_TOLERANCE = 1e-9  # rounding [m/s]
 _HEADING_FIRST = 2.0  # half wheelbases per frame: the heading of a faster car would not calm down by itself
 
 
@@ -23,6 +25,7 @@ class Body(NamedTuple):
     turned: float = 0.0  # likewise [rad]
     idle: float = 0.0  # likewise [rad]
     backs_up: bool = False  # its driver asks for reverse by braking at standstill; others only hold then
+    a_stop: float = np.inf  # with which it stops backing up [m/s^2]
 
 
 @compiled
@@ -31,7 +34,26 @@ def restrict(nominal, bounds, ego, body, rules, dt):
     a = min(max(nominal.acceleration, bounds.a_lower), bounds.a_upper)
     if bounds.a_lower > -np.inf or bounds.a_upper < 0.0:
         a = max(a, _least_acceleration(nominal.acceleration, bounds, ego.speed, body, dt))
-    return Command(a, _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt))
+    slip = _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt)
+    longest = _HEADING_FIRST * body.half_wheelbase / dt
+    if ego.speed < longest <= ego.speed + a * dt and not _is_calm(slip, bounds, ego, a, body, dt):
+        a = (_JUST_BELOW * longest - ego.speed) / dt
+        slip = _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt)
+    return Command(a, slip)
+
+
+@inner
+def _is_calm(slip, bounds, ego, a, body, dt):
+    """Does the heading after a frame commit a car that gets as fast as `_HEADING_FIRST` to no more than it may?
+
+    A slower one turns back and forth where it may not move sideways at all, which changes nothing: it sets its lateral
+    speed first. A faster one could not any more, so it does not get that fast before its heading is calm (C9).
+    """
+    v, v_next = ego.speed, ego.speed + a * dt
+    free = _idle_headings(body, v, v_next, dt)
+    psi_next = ego.heading + v * dt / body.half_wheelbase * np.sin(slip) - body.curvature * v * dt
+    u = v_next * np.sin(outside(psi_next, free[0], free[1]))
+    return -bounds.left_next - _TOLERANCE <= u <= bounds.right_next + _TOLERANCE
 
 
 @inner
@@ -58,7 +80,7 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     if abs(v) < STANDSTILL or (bounds.left == np.inf and bounds.right == np.inf):
         return slip
     if v < 0.0:
-        return _restrict_slip_backwards(slip, bounds, ego, body, rules, dt)
+        return _restrict_slip_backwards(slip, bounds, ego, a, body, rules, dt)
     v_next = max(v + a * dt, STANDSTILL)
     psi, gain = ego.heading, v * dt / body.half_wheelbase
     arc = body.curvature * v * dt  # the lane turns under the car during the frame ...
@@ -88,24 +110,38 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
 
 
 @inner
-def _restrict_slip_backwards(slip, bounds, ego, body, rules, dt):
+def _restrict_slip_backwards(slip, bounds, ego, a, body, rules, dt):
     """The same in reverse: first the lateral speed of this frame, then the heading.
 
     The slip that ends the sideways motion turns the car farther from the lane there, by v dt / half_wheelbase of its
-    angle. So a car that has to stop moving sideways also stops backing up, and comes to rest before that matters: until
-    then its side sweeps no more than the speed at its angle to the lane does, which is less than its share (Def. 6).
+    angle. So it backs up only as fast, and turned only as far, as lets it come to rest inside the heading bound with
+    that slip (`straight_enough`): its box is no longer than the bound says, and its side sweeps no more than the speed
+    at its angle to the lane does, which is less than its share (Def. 6).
     """
     v, psi, gain = ego.speed, ego.heading, ego.speed * dt / body.half_wheelbase
     turned = body.curvature * v * dt
     drift = 0.5 * turned * v
     low, high = _arcsin((bounds.right + drift) / v) - psi, _arcsin((-bounds.left + drift) / v) - psi
     if rules.heading_bound < 1.0:
-        largest = np.arcsin(rules.heading_bound)
+        largest = np.arcsin(rules.heading_bound) * straight_enough(v + a * dt, body.a_stop, body.half_wheelbase, dt)
         straight_low = _arcsin((largest - psi + turned) / gain)
         straight_high = _arcsin((-largest - psi + turned) / gain)
         low, high = min(max(low, straight_low), high), max(min(high, straight_high), low)
     low, high = max(low, -body.max_slip), min(high, body.max_slip)
     return min(max(slip, low), high)
+
+
+@inner
+def straight_enough(v, a_stop, half_wheelbase, dt):
+    """Share of the heading bound within which a car that backs up comes to rest inside it, moving straight (H12).
+
+    Moving straight turns it farther by the factor e on each half wheelbase that it goes back.
+    """
+    back, in_a_frame = max(-v, 0.0), a_stop * dt
+    way = back * dt
+    if back > in_a_frame:
+        way = 0.5 * (way + back * back / a_stop) + in_a_frame * dt / 8  # by explicit Euler (C5)
+    return np.exp(-way / half_wheelbase)
 
 
 @inner

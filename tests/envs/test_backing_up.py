@@ -32,8 +32,9 @@ def test_among_the_lawful_an_ego_that_backs_up_is_touched_by_nobody(others, dt, 
     assert (episodes["contact"] == -1).all()
     assert episodes["broken"].sum() == 0, "the ego broke a duty"
     assert (episodes["backed_up"] > 0).mean() > 0.3
-    assert 1.4 < episodes["fastest_back"].max() <= w.published.reverse_speed + 1e-9
-    assert episodes["heading"].max() <= 1.25 * np.arcsin(w.published.heading_bound)
+    # most are turned when they begin, so they have to be slower than a straight one
+    assert 0.7 < episodes["fastest_back"].max() <= w.published.reverse_speed + 1e-9
+    assert episodes["heading"].max() <= np.arcsin(w.published.heading_bound) + 1e-6
 
 
 @pytest.mark.parametrize("dt", [1 / 15, 1 / 5])

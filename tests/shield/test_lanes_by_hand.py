@@ -332,11 +332,38 @@ def test_in_reverse_the_lateral_speed_and_the_heading_are_limited_too():
     for side in (-1.0, 1.0):  # 0.2 m/s more than none
         slip = restrict(Command(0.0, 0.5 * side), bounds, ego, BODY, TABLE.rules, DT).slip
         assert np.sin(slip) == pytest.approx(0.2 * side)
-    # at the heading bound it may not turn on: it turns by -0.08 of the slip
-    turned = car(0.0, -1.0, heading=np.arcsin(0.1))
+    # it keeps to the heading at which, moving straight, it comes to rest inside the bound: 1 m/s takes it 0.2 m back
+    # in a frame in which it stops, and 0.1 + 0.125 + 0.02 m with a brake of 4 m/s^2. It turns by -0.08 of the slip
     wide = bounds._replace(left=9.0, right=9.0)
-    assert restrict(Command(0.0, -0.5), wide, turned, BODY, TABLE.rules, DT).slip == pytest.approx(0.0)
-    assert restrict(Command(0.0, 0.05), wide, turned, BODY, TABLE.rules, DT).slip == pytest.approx(0.05)
+    for a_stop, way in ((np.inf, 0.2), (4.0, 0.245)):
+        largest = np.arcsin(0.1) * np.exp(-way / 2.5)
+        turned, body = car(0.0, -1.0, heading=largest), BODY._replace(a_stop=a_stop)
+        assert restrict(Command(0.0, -0.5), wide, turned, body, TABLE.rules, DT).slip == pytest.approx(0.0)
+        assert restrict(Command(0.0, 0.05), wide, turned, body, TABLE.rules, DT).slip == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("sine", "slowest"), [(0.0, -0.6), (0.09, -0.6), (0.097, -0.3655), (0.0999, -0.012), (0.1001, 0.0)]
+)
+def test_who_backs_up_is_straight_enough_to_come_to_rest_inside_the_heading_bound(sine, slowest):
+    """H12. A frame of 0.2 s at 3 m/s^2 begins it. At sine 0.097 there is room for 2.4 ln(0.1 / 0.097) = 73 mm, which
+    0.3655 m/s take in the frame in which it stops."""
+    ego = car(0.0, 0.0, heading=np.arcsin(sine), sin=sine)
+    found = always_on(ego, TABLE.ego, TABLE.rules, DT).v_lower
+    assert found == pytest.approx(slowest, abs=1e-3)
+
+
+def test_nobody_gets_so_fast_that_a_heading_could_not_calm_down_before_it_has():
+    """C9. With 2 half wheelbases per frame, 25 m/s at 5 Hz. Where it may not move sideways, a slower car turns back."""
+    body, dt = Body(2.5, 0.7, 0.0, a_stop=4.0), 0.2
+    for heading, fast in ((0.0, True), (0.02, False), (-0.02, False)):
+        ego = car(0.0, 24.9, heading=heading)
+        bounds = always_on(ego, TABLE.ego, TABLE.rules, dt)._replace(left=0.0, right=0.0, left_next=0.1, right_next=0.1)
+        command = restrict(Command(3.0, 0.0), bounds, ego, body, TABLE.rules, dt)
+        assert (24.9 + command.acceleration * dt >= 25.0) == fast
+        assert 24.9 * np.sin(heading + command.slip) == pytest.approx(0.0, abs=1e-9)
+        if not fast:
+            assert command.acceleration == pytest.approx(0.5)
 
 
 def test_nobody_backs_up_toward_who_is_near_behind():
