@@ -1,7 +1,7 @@
 """`crosswalk-v0`: a street with a marked crossing, and people who cross there, elsewhere, or jump onto the road.
 
-A van that is parked before the crossing hides who comes from the right. Importing this module registers the
-environment.
+A van that is parked before the crossing hides who comes from the right, on the crossing or between the two. Importing
+this module registers the environment.
 """
 
 import gymnasium as gym
@@ -34,20 +34,22 @@ class Van(ParkedCar):
     LENGTH, WIDTH = 6.0, 2.2
 
 
+_BEFORE = 2.5  # from the van to the crossing [m]
+_VAN = CROSSING.start - _BEFORE - Van.LENGTH, CROSSING.start - _BEFORE  # where it is parked [m]
+_APART = 0.5  # that people stand from it [m]
+
+
 class CrosswalkEnv(StreetEnv):
     """See the module, and `StreetEnv` for the configuration."""
 
     def _surround(self):
         if not self.config["occluders"]:
             return Surroundings(crossings=(CROSSING,)), []
-        van = Van(self.road, (CROSSING.start - 2.5 - Van.LENGTH / 2, LANE + 0.4 + Van.WIDTH / 2), 0.0)
-        columns = tuple(self._waiting(side) for side in (1.0, -1.0))
-        return Surroundings((box_of_parked(van),), columns, (CROSSING,)), [van]
-
-    def _waiting(self, side: float) -> Columns:
+        van = Van(self.road, (sum(_VAN) / 2, LANE + 0.4 + Van.WIDTH / 2), 0.0)
         x = np.arange(CROSSING.start, CROSSING.end + 0.1, 0.5)
-        points = np.stack(np.meshgrid(x, [side * (KERB - 0.6 + d) for d in _WAITS], indexing="ij"), axis=-1)
-        return Columns(points, np.full(len(x), -side * np.pi / 2), PLACE, 0)
+        columns = tuple(_column(x, side, PLACE, 0) for side in (1.0, -1.0))
+        between = _column(np.arange(_VAN[1] + _APART, CROSSING.start - 0.1, 0.5), 1.0, BESIDE, -1)
+        return Surroundings((box_of_parked(van),), (*columns, between), (CROSSING,)), [van]
 
     def _people(self) -> list[Person]:
         rng = self.np_random
@@ -70,7 +72,15 @@ class CrosswalkEnv(StreetEnv):
 
     def _at(self, x: float, errand: Errand, place: tuple[str, str]) -> Person:
         y = float(self.np_random.choice([-1.0, 1.0]) * KERB)
+        if y > 0.0 and self.config["occluders"] and _VAN[0] - _APART < x < _VAN[1] + _APART:  # nobody stands in a van
+            x = _VAN[0] - _APART if x < sum(_VAN) / 2 else _VAN[1] + _APART
         return Person(x, y, errand._replace(until=-y), place)
+
+
+def _column(x: np.ndarray, side: float, place: tuple[str, str], crossing: int) -> Columns:
+    """People who stand unseen on one side of the road, at `x` [m] along it."""
+    points = np.stack(np.meshgrid(x, [side * (KERB - 0.6 + d) for d in _WAITS], indexing="ij"), axis=-1)
+    return Columns(points, np.full(len(x), -side * np.pi / 2), place, crossing)
 
 
 gym.register(id=ENV_ID, entry_point="rss_shield.envs.worlds.crosswalk:CrosswalkEnv")

@@ -117,7 +117,7 @@ def play(block: Block, threads: int = 1) -> dict[str, Any]:
 def counted(table: pd.DataFrame) -> dict[str, Any]:
     """What is kept of episodes: how many there were by verdict, seconds and metres driven, duties broken, pair-frames
     in danger, seconds overridden, the smallest time to collision and margin, of episodes with a bad verdict seed,
-    verdict and actions, and likewise of those in which the judge says something else."""
+    verdict and actions, and likewise of those in which a duty was broken or the judge says something else."""
     bad = table[table["blame"].isin(BAD)]
     judged: dict[str, Any] = {}
     if "judged" in table:
@@ -138,6 +138,7 @@ def counted(table: pd.DataFrame) -> dict[str, Any]:
         "min_ttc": float(table["min_ttc"].min()),
         "worst_margin": float(table["worst_margin"].min()),
         "bad": bad[["seed", "blame", "actions"]].to_dict("records"),
+        "broken": table.loc[table["broken_duties"] > 0, ["seed", "actions"]].to_dict("records"),
         **({"judged": judged} if judged else {}),
     }
 

@@ -152,6 +152,19 @@ def test_a_trace_says_who_the_pedestrians_are(tmp_path):
     assert any(one["first_seen"] >= 0 for one in people)
 
 
+@pytest.mark.parametrize("x", [53.0, 56.0, 57.0, 57.7])
+def test_who_jumps_out_between_the_van_and_the_crossing_is_counted_on(x):
+    """Once people stood inside the van, where nobody expects any, and the ego was to blame when one jumped out."""
+    env = make("crosswalk-v0", config=ALONE)
+    for when_near in (4.0, 8.0, 12.0):
+        env.reset(seed=0)
+        person = env.unwrapped._at(x, Errand(JUMPS, 5.5, 0.0, when_near, 0.0), ("pedestrian", "roadside"))
+        assert person.y < 0.0 or not 49.0 < person.x < 56.0
+        put(env, max(person.x, 56.0), KERB, person.errand._replace(until=-KERB), person.place)
+        info, _ = drive(env)
+        assert info["blame"] not in AT_FAULT
+
+
 def test_masks_look_at_pedestrians_and_change_nothing():
     env = make("parked-row-v0", config=ALONE)
     env.reset(seed=0)
