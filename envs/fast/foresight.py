@@ -132,7 +132,8 @@ def _foresee_on_lanes(e, cars, episode, sight, desk, world, batch, watch, settin
     bend = measure(cars, copy, lanes, sight, distances, watch.boxes, settings, *limits, aware)
     me = past.ego[copy.turn]
     seen = Seen(me, sight.users, past.ego[row_before(copy)], sight.users_before, past.memory)
-    body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack, bend.turned, bend.idle, False)
+    stops = settings.table.ego.a_min_brake
+    body = Body(car.length / 2, watch.max_slip, bend.curvature, bend.slack, bend.turned, bend.idle, False, stops)
     who, before = past.near[: copy.near], _chosen(car)
     for a in range(len(world.labels)):
         take_meta_action(cars, episode.ego, world.labels[a], net, lanes, sight, world.target_speeds)

@@ -58,7 +58,9 @@ def _on_lanes(ego: ShieldedEgo, names: list[str], frames: int) -> np.ndarray:
         settings = without_anticipation(ego.settings)
         users, me, bend = ego._sense()
         seen, stage = Seen(me, users, *ego.last, ego.memory), make_stage(len(users))
-        body = Body(*ego.body, bend.curvature, bend.slack, bend.turned, bend.idle, False)
+        body = Body(
+            *ego.body, bend.curvature, bend.slack, bend.turned, bend.idle, False, settings.table.ego.a_min_brake
+        )
         for a, name in enumerate(names):
             with _as_if(vehicle, name):
                 target = vehicle.target_lane_index

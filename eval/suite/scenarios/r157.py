@@ -159,7 +159,7 @@ def _is_hit(v, u, gap, lateral, braking, hidden, half_length, half_width, evasio
         np.zeros(1, ROAD_USER),
     )
     memory, evading = np.zeros(1, MEMORY), False
-    body = Body(0.5 * LENGTH, 0.5, 0.0, 0.0, 0.0, 0.0, False)
+    body = Body(0.5 * LENGTH, 0.5, 0.0, 0.0, 0.0, 0.0, False, table.ego.a_min_brake)
     s, s_other, y_other = 0.0, gap + LENGTH, 0.0
     if lateral > 0.0:
         y_other = ASIDE + WIDTH
