@@ -511,8 +511,7 @@ def _shielded(nominal, ego, seen, users, last, memory, w, result):
         bounds = always_on(seen, w.ego, w.rules, w.dt)
         for i in range(w.others):
             bounds = merge(bounds, memory[i], w.ego, w.rules, w.dt)
-        body = _body(w)
-        a, slip = restrict(nominal, bounds, seen, body, w.steering, w.dt)
+        a, slip = restrict(nominal, bounds, seen, _body(w), w.steering, w.dt)
     return Command(a, slip)
 
 
