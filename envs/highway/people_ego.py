@@ -16,7 +16,7 @@ from rss_shield.shield.junctions.controller import JunctionReport
 from rss_shield.shield.junctions.memory import CROSSING
 from rss_shield.shield.junctions.plans import Scene
 from rss_shield.shield.junctions.reach import THREAT
-from rss_shield.shield.people.judge import WATCHED, Seen, judge_exposure, watch_person
+from rss_shield.shield.people.judge import WATCHED, Seen, judge_caution, note_exposure, remember_person, watch_person
 from rss_shield.shield.people.reach import PERSON, has_way, list_people, place_on_path
 from rss_shield.shield.verdicts import INHERITED, KEPT, OTHER, Verdict
 
@@ -125,21 +125,26 @@ class PeopleEgo(JunctionEgo):
     def _restrict(
         self, scene: Scene, acceleration: float, steering: float, holds: bool = False
     ) -> tuple[JunctionReport, float]:
-        remembered = self._remembered(len(self.samples))
+        remembered, walk, dt = self._remembered(len(self.samples)), self.vehicle.road.surroundings.walk, scene.table.dt
+        appeared = self._appeared()
+        for i in appeared:
+            other = self.others[i]
+            note_exposure(remembered[i], max(float(other.speed), 0.0), *reasonable_speeds(other))
+        seen = {i: self._seen(scene, i) for i in self.people}
+        for i, person in seen.items():
+            watch_person(self.watched[i], remembered[i], person, walk, dt)
         result = super()._restrict(scene, acceleration, steering, holds)
+        for i in appeared:
+            judge_caution(remembered[i])
+        for i, person in seen.items():
+            remember_person(self.watched[i], remembered[i], person)
         self.crossings[:] = remembered[: len(self.crossings)]
-        self._watch(scene)
         return result
 
-    def _watch(self, scene: Scene) -> None:
-        """Hold pedestrians, and whoever has just come out of hiding, to what they owe."""
+    def _appeared(self) -> list[int]:
+        """Indices of those who have just come out of hiding."""
         road = self.vehicle.road
-        for i, other in enumerate(self.others):
-            if self.crossings[i]["age"] == 1 and road.was_hidden(other):
-                judge_exposure(self.crossings[i], max(float(other.speed), 0.0), *reasonable_speeds(other))
-        for i in self.people:
-            walk, dt = road.surroundings.walk, self.settings.table.dt
-            watch_person(self.watched[i], self.crossings[i], self._seen(scene, i), walk, dt)
+        return [i for i, other in enumerate(self.others) if self.crossings[i]["age"] == 0 and road.was_hidden(other)]
 
     def _seen(self, scene: Scene, i: int) -> Seen:
         track = scene.track
@@ -167,7 +172,6 @@ class PeopleEgo(JunctionEgo):
         scene, walk = self._scene_of(track, threats, roads), self.vehicle.road.surroundings.walk
         for i in set(touching).intersection(self.people):
             seen = self._seen(scene, i)._replace(in_way=True, near=True)
-            self.crossings[i]["since"] += 1
             watch_person(self.watched[i], self.crossings[i], seen, walk, self.settings.table.dt)
         found = super()._verdicts(touching)
         return [

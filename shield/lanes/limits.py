@@ -32,7 +32,8 @@ def _slowest(ego, params, rules, dt):
         return held
     slowest, b = -rules.reverse_speed, params.a_min_brake
     if rules.heading_bound < 1.0:
-        half_wheelbase = ego.half_length - rules.heading_bound * ego.half_width  # or less
+        # or less; in tight bends up to 0.1 % more, where its box is counted as turned by more than this bound anyway
+        half_wheelbase = ego.half_length - rules.heading_bound * ego.half_width
         turned = max(abs(ego.sin), 1e-9) / rules.heading_bound
         room = min(ego.speed, 0.0) * dt - half_wheelbase * np.log(turned)  # way that is left after this frame
         if room <= 0.0:

@@ -29,7 +29,6 @@ _JITTER = 0.05  # [m/s]
 # What is remembered of one pedestrian. SI units.
 WATCHED = np.dtype(
     [
-        ("age", "i8"),  # samples since first sight
         ("x", "f8"),  # at the last sample with a plan
         ("y", "f8"),
         ("heading", "f8"),
@@ -60,11 +59,13 @@ class Seen(NamedTuple):
 
 @compiled
 def watch_person(memory, crossing, seen, walk, dt):
-    """Take in one sample of a pedestrian, after the ego was judged on it.
+    """Take in one sample of a pedestrian: what has it broken? Before the ego is judged on it.
+
+    `judge_user` forgets what was broken if the ego has a plan toward it all the same.
 
     Args:
       memory: WATCHED, changed in place.
-      crossing: CROSSING of the same, after `judge_user`; what the pedestrian broke is entered.
+      crossing: CROSSING of the same up to the sample before; what the pedestrian broke is entered.
       seen: `Seen`.
       walk: `Walk`.
       dt: length of a frame [s].
@@ -72,15 +73,21 @@ def watch_person(memory, crossing, seen, walk, dt):
     if seen.in_way and not memory.in_way:
         memory.came_after = seen.beside
     memory.in_way = seen.in_way
-    if memory.age == 0 or crossing.since == 0:
-        memory.x, memory.y, memory.heading, memory.v = seen.x, seen.y, seen.heading, seen.v
-        memory.has_way = seen.has_way
-    memory.age += 1
-    duty, excess = broken_by(memory, seen, crossing.since * dt, walk, dt)
+    duty, excess = KEPT, 0.0
+    if crossing.age > 0:
+        duty, excess = broken_by(memory, seen, (crossing.since + 1) * dt, walk, dt)
     if seen.near and (memory.came_after or seen.stands):
         duty, excess = WALKED_IN, 0.0
     if duty != KEPT and crossing.other_broke == KEPT:
         crossing.other_broke, crossing.other_excess = duty, excess
+
+
+@compiled
+def remember_person(memory, crossing, seen):
+    """What it does from now on is measured from this sample if the ego has a plan on it; after `judge_user`."""
+    if crossing.age == 1 or crossing.since == 0:
+        memory.x, memory.y, memory.heading, memory.v = seen.x, seen.y, seen.heading, seen.v
+        memory.has_way = seen.has_way
 
 
 @inner
@@ -100,16 +107,19 @@ def broken_by(memory, seen, since, walk, dt):
 
 
 @compiled
-def judge_exposure(crossing, v, v_low, v_high):
-    """Somebody was hidden and has just been seen first (Defs. 24-26); after the ego was judged on that sample.
+def note_exposure(crossing, v, v_low, v_high):
+    """Somebody was hidden and is seen first on this sample (Defs. 24, 25). Before the ego is judged on it.
 
     Args:
-      crossing: CROSSING after `judge_user`, of age 1.
+      crossing: CROSSING of who has not been sampled yet.
       v: its speed, v_low, v_high: what is reasonable there [m/s].
     """
-    if crossing.items != 0 or crossing.age != 1:
-        return
     if is_unreasonable_speed(v, v_low, v_high + _JITTER):
         crossing.other_broke, crossing.other_excess = UNREASONABLE, v - v_high
-    elif crossing.ego_broke == KEPT:
+
+
+@compiled
+def judge_caution(crossing):
+    """After `judge_user` on that sample: toward who comes out reasonably the ego must have a plan (Def. 26)."""
+    if crossing.age == 1 and crossing.items == 0 and crossing.other_broke == KEPT and crossing.ego_broke == KEPT:
         crossing.ego_broke, crossing.ego_excess = NO_CAUTION, 0.0

@@ -5,8 +5,9 @@ import pytest
 
 from rss_shield import make
 from rss_shield.envs.highway.recorder import record_trace
+from rss_shield.envs.worlds.crosswalk import BESIDE, CrosswalkEnv
 from rss_shield.envs.worlds.occluded import PLACE, ROW
-from rss_shield.envs.worlds.streets import KERB, START
+from rss_shield.envs.worlds.streets import KERB, START, Person
 from rss_shield.envs.worlds.walkers import DASHES, JUMPS, RUNS_OUT, UNREASONABLE_ERRANDS, Errand, Walker
 from rss_shield.shield.definitions.occlusion import REASONABLE
 from rss_shield.shield.trace import load, save
@@ -163,6 +164,31 @@ def test_who_jumps_out_between_the_van_and_the_crossing_is_counted_on(x):
         put(env, max(person.x, 56.0), KERB, person.errand._replace(until=-KERB), person.place)
         info, _ = drive(env)
         assert info["blame"] not in AT_FAULT
+
+
+def test_who_hurried_and_trapped_the_ego_is_alone_to_blame(monkeypatch):
+    """Once what a pedestrian broke was noted after the ego was judged on it: a frame late to say who trapped it (H24).
+
+    The jumper is put where nobody is counted on, so that the ego finds itself without a plan.
+    """
+    people, surround = CrosswalkEnv._people, CrosswalkEnv._surround
+
+    def with_jumper(env):
+        *others, last = people(env)
+        x = 56.0 + np.random.default_rng(25).uniform(0.0, 2.0)
+        return [*others, Person(x, KERB, last.errand._replace(until=-KERB), BESIDE)]
+
+    def without_ghosts_beside_the_van(env):
+        surroundings, parked = surround(env)
+        return surroundings._replace(columns=surroundings.columns[:2]), parked
+
+    monkeypatch.setattr(CrosswalkEnv, "_people", with_jumper)
+    monkeypatch.setattr(CrosswalkEnv, "_surround", without_ghosts_beside_the_van)
+    env = make("crosswalk-v0", config={"unreasonable": 1.0, "pedestrians": 2})
+    env.reset(seed=25)
+    info, _ = drive(env)
+    assert info["blame"] == "other"
+    assert info["blame_evidence"]["other_duty"] == DUTIES[HURRIED]
 
 
 def test_masks_look_at_pedestrians_and_change_nothing():

@@ -5,7 +5,7 @@ import pytest
 
 from rss_shield.shield.definitions.pedestrians import WALKS
 from rss_shield.shield.junctions.memory import CROSSING
-from rss_shield.shield.people.judge import WATCHED, Seen, judge_exposure, watch_person
+from rss_shield.shield.people.judge import WATCHED, Seen, judge_caution, note_exposure, remember_person, watch_person
 from rss_shield.shield.verdicts import DUTIES, HURRIED, KEPT, LEAPED, LEFT_CROSSING, NO_CAUTION, UNREASONABLE, WALKED_IN
 
 WALK, DT = WALKS["paper"], 1 / 15
@@ -16,10 +16,11 @@ def watched(*samples: tuple[Seen, int]) -> int:
     """Duty that a pedestrian has broken after samples, each with the frames since the last plan."""
     memory, crossing = np.zeros(1, WATCHED)[0], np.zeros(1, CROSSING)[0]
     for seen, since in samples:
-        crossing["since"] = since
-        if since == 0:
-            crossing["other_broke"] = KEPT  # as `judge_user` does
+        # several samples without a plan in between are one here
+        crossing["since"] = max(since - 1, 0)
         watch_person(memory, crossing, seen, WALK, DT)
+        crossing["since"], crossing["age"] = since, crossing["age"] + 1  # as `judge_user` does
+        remember_person(memory, crossing, seen)
     return int(crossing["other_broke"])
 
 
@@ -59,18 +60,26 @@ def test_who_walks_into_a_standing_car_is_to_blame():
     assert watched((STANDS, 0), (STANDS._replace(in_way=True, near=True, stands=True), 0)) == WALKED_IN
 
 
+@pytest.mark.parametrize(("v", "other"), [(2.0, KEPT), (2.8, KEPT), (4.0, UNREASONABLE)])
+def test_who_comes_out_of_hiding_too_fast_is_unreasonable(v, other):
+    crossing = np.zeros(1, CROSSING)[0]
+    note_exposure(crossing, v, 0.0, 2.78)
+    assert crossing["other_broke"] == other
+    assert DUTIES[UNREASONABLE]
+
+
 @pytest.mark.parametrize(
-    ("items", "age", "v", "ego", "other"),
+    ("items", "age", "other", "ego"),
     [
-        (0, 1, 2.0, NO_CAUTION, KEPT),  # reasonable, and the ego has no plan
-        (0, 1, 4.0, KEPT, UNREASONABLE),
-        (1, 1, 4.0, KEPT, KEPT),  # a plan: nothing has happened
-        (0, 2, 2.0, KEPT, KEPT),  # not the first sample
+        (0, 1, KEPT, NO_CAUTION),  # reasonable, and the ego has no plan
+        (0, 1, UNREASONABLE, KEPT),
+        (1, 1, KEPT, KEPT),  # a plan: nothing has happened
+        (0, 2, KEPT, KEPT),  # not the first sample
     ],
 )
-def test_first_sight_of_who_was_hidden(items, age, v, ego, other):
+def test_toward_who_comes_out_of_hiding_the_ego_has_a_plan(items, age, other, ego):
     crossing = np.zeros(1, CROSSING)[0]
-    crossing["items"], crossing["age"] = items, age
-    judge_exposure(crossing, v, 0.0, 2.78)
-    assert (crossing["ego_broke"], crossing["other_broke"]) == (ego, other)
-    assert DUTIES[NO_CAUTION] and DUTIES[UNREASONABLE]
+    crossing["items"], crossing["age"], crossing["other_broke"] = items, age, other
+    judge_caution(crossing)
+    assert crossing["ego_broke"] == ego
+    assert DUTIES[NO_CAUTION]
