@@ -12,7 +12,7 @@ import numpy as np
 from rss_shield.envs.fast.state import OBSTACLE, UNSEEN
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.lanes import reach_on, road_through, turned_round
-from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at
+from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, STRAIGHT, heading_at
 from rss_shield.envs.sensing import age_of
 from rss_shield.shield._numba.compiled import inner, rare
 from rss_shield.shield.comfort import gap_in_way
@@ -84,8 +84,11 @@ def compile_lane_frames(network, settings: Settings, ground: Ground | None = Non
 @inner
 def road_under(ego, index, lanes, sight):
     """Row of the road that the ego is measured along: that of its lane, or turned round if it drives against that."""
-    s = sight.s[ego.lane, index]
-    against = np.cos(ego.heading - heading_at(lanes[ego.lane], s)) < 0.0
+    lane = lanes[ego.lane]
+    if lane.kind == STRAIGHT:
+        against = ego.cos * lane.ly - ego.sin * lane.lx < 0.0
+    else:
+        against = np.cos(ego.heading - heading_at(lane, sight.s[ego.lane, index])) < 0.0
     return ego.lane + len(lanes) if against else ego.lane
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rss_shield.shield._numba.compiled import compiled, inner
+from rss_shield.shield._numba.compiled import compiled, inner, part, rare
 from rss_shield.shield.command import Command
 from rss_shield.shield.lanes.frame import outside
 from rss_shield.shield.lanes.pair import STANDSTILL
@@ -36,10 +36,18 @@ def restrict(nominal, bounds, ego, body, rules, dt):
         a = max(a, _least_acceleration(nominal.acceleration, bounds, ego.speed, body, dt))
     slip = _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt)
     longest = _HEADING_FIRST * body.half_wheelbase / dt
-    if ego.speed < longest <= ego.speed + a * dt and not _is_calm(slip, bounds, ego, a, body, dt):
-        a = (_JUST_BELOW * longest - ego.speed) / dt
-        slip = _restrict_slip(nominal.slip, bounds, ego, a, body, rules, dt)
+    if ego.speed < longest <= ego.speed + a * dt:
+        return _once_calm(Command(a, slip), nominal.slip, longest, bounds, ego, body, rules, dt)
     return Command(a, slip)
+
+
+@rare
+def _once_calm(command, wish, longest, bounds, ego, body, rules, dt):
+    """The command, or one that stays slower than `longest` [m/s] while the heading is not calm."""
+    if _is_calm(command.slip, bounds, ego, command.acceleration, body, dt):
+        return command
+    a = (_JUST_BELOW * longest - ego.speed) / dt
+    return Command(a, _restrict_slip(wish, bounds, ego, a, body, rules, dt))
 
 
 @inner
@@ -91,6 +99,12 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     permitted = _is_permitted(psi + slip, psi_next, free, v, v_next, drift, bounds, rules)
     if permitted and abs(slip) <= body.max_slip:
         return slip
+    return _solve_slip(slip, bounds, psi, turned, drift, gain, v, v_next, free, body.max_slip, rules.heading_bound)
+
+
+@part
+def _solve_slip(slip, bounds, psi, turned, drift, gain, v, v_next, free, max_slip, heading_bound):
+    """The exact solution of `_restrict_slip`, where the slip that is asked for is not permitted as it is."""
     neutral = _straightening_slip(psi, turned, drift, gain, v, v_next, free, bounds)
 
     # lateral speed of this frame: -left <= v sin(psi + slip) - drift <= right
@@ -98,18 +112,18 @@ def _restrict_slip(slip, bounds, ego, a, body, rules, dt):
     high = max(_arcsin((bounds.right + drift) / v) - psi, neutral)
     # heading after this frame, by the speed it commits to and by the heading bound
     psi_low, psi_high = _arcsin(-bounds.left_next / v_next) + free[0], _arcsin(bounds.right_next / v_next) + free[1]
-    if rules.heading_bound < 1.0:
+    if heading_bound < 1.0:
         # the course, slip included, keeps the bound too: a leader's way along the lane relies on it
-        largest = np.arcsin(rules.heading_bound)
+        largest = np.arcsin(heading_bound)
         low, high = max(low, min(-largest - psi, neutral)), min(high, max(largest - psi, neutral))
         psi_low, psi_high = max(psi_low, -largest), min(psi_high, largest)
     low = max(low, min(_arcsin((psi_low - psi + turned) / gain), neutral))
     high = min(high, max(_arcsin((psi_high - psi + turned) / gain), neutral))
-    low, high = max(low, -body.max_slip), min(high, body.max_slip)
+    low, high = max(low, -max_slip), min(high, max_slip)
     return min(max(slip, low), high)
 
 
-@inner
+@rare
 def _restrict_slip_backwards(slip, bounds, ego, a, body, rules, dt):
     """The same in reverse: first the lateral speed of this frame, then the heading.
 
@@ -164,7 +178,9 @@ def _is_permitted(course, psi_next, free, v, v_next, drift, bounds, rules):
     """Do course and next heading [rad] keep all bounds? The bounds in closed form, without solving for the slip."""
     if abs(course) >= _STEEP or abs(psi_next) >= _STEEP:
         return False
-    sin, sin_next, sin_committed = np.sin(course), np.sin(psi_next), np.sin(outside(psi_next, free[0], free[1]))
+    committed = outside(psi_next, free[0], free[1])
+    sin, sin_next = np.sin(course), np.sin(psi_next)
+    sin_committed = sin_next if committed == psi_next else np.sin(committed)
     steepest = rules.heading_bound
     return (
         -bounds.left <= v * sin - drift <= bounds.right
