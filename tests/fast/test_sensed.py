@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rss_shield import make_vec
+from rss_shield import make, make_vec
 
 NOISE = dict(along=0.5, across=0.3, speed=1.0, heading=0.02, misses=0.2, ghosts=0.3, wrong_lane=0.1, latency=0.14)
 CASES = {
@@ -34,6 +34,17 @@ def test_both_simulators_have_the_same_errors(name):
     for row, expected in zip(engine, original, strict=True):
         for value, other in zip(row, expected, strict=True):
             assert np.array_equal(value, other)
+
+
+def test_the_judge_goes_by_what_is_there_in_both_simulators():
+    """Once the engine's judge took what the shield had inflated for vague, and asked the ego for brakes."""
+    options = {"params": {"ego": {"response_time": 0.8}}, "sensing": {"latency": 0.4, "inflate": True}}
+    envs, env = make_vec("highway-fast-v0", 1, **options), make("highway-fast-v0", **options)
+    envs.reset(seed=[930_365]), env.reset(seed=930_365)
+    for _ in range(18):
+        infos, info = envs.step(np.array([3]))[-1], env.step(3)[-1]
+    assert info["episode_dangerous_pairs"] == infos["episode_dangerous_pairs"][0] == 86
+    assert info["episode_broken_duties"] == infos["episode_broken_duties"][0] == 0
 
 
 def test_sensing_without_errors_changes_nothing():
