@@ -26,6 +26,7 @@ from rss_shield.shield.definitions.evasion import (
     smallest_separation,
 )
 from rss_shield.shield.definitions.lateral import d_min_no_credit
+from rss_shield.shield.ground import table_of
 from rss_shield.shield.lanes.memory import owes_braking
 from rss_shield.shield.lanes.pair import STANDSTILL
 from rss_shield.shield.lanes.restriction import straighten
@@ -132,22 +133,23 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
 
 @inner
 def _offenders(ego, users, memory, table, who):
-    """(is there danger, set of bits: who makes an evasion owed, is one of them hit else), by place in `who`."""
-    me, dangerous, offenders, urgent = _motion_of_ego(ego), False, 0, False
-    for a in range(min(how_many(who, users), _MOST_AT_ONCE)):
+    """(is there danger, set of bits: who makes an evasion owed, is one of them hit else), by place among those in it."""
+    me, place, offenders, urgent = _motion_of_ego(ego), 0, 0, False
+    for a in range(how_many(who, users)):
         i = which(who, a)
         if memory[i].since == 0:
             continue
-        dangerous = True
         other = _motion_of(users[i], memory[i])
         braking = table.ego.a_min_brake if owes_braking(memory[i], table.rules) != 0 else 0.0
         basic = Plan(-braking, 0.0, 0.0)
         collides = smallest_separation(me, basic, other, HORIZON, STEP) < 0.0
-        enough = not collides and _is_over(me, basic, other, table)
-        if must_evade(True, memory[i].other_broke == KEPT, collides, not enough):
-            offenders |= 1 << a
+        enough = not collides and _is_over(me, basic, other, table_of(table, users[i]))
+        # whether the family has a way out is found out afterwards; the basic response may be one already
+        if place < _MOST_AT_ONCE and not enough and must_evade(True, memory[i].other_broke == KEPT, collides, True):
+            offenders |= 1 << place
             urgent = urgent or collides
-    return dangerous, offenders, urgent
+        place += 1
+    return place > 0, offenders, urgent
 
 
 @inner
@@ -168,8 +170,8 @@ def _is_possible(me, plan, room, table):
 @inner
 def _outcome(me, plan, users, memory, offenders, table, who):
     """(smallest separation from those in danger with the ego, is it out of danger with the offenders in the end)."""
-    smallest, ends = np.inf, True
-    for a in range(min(how_many(who, users), _MOST_AT_ONCE)):
+    smallest, ends, place = np.inf, True, 0
+    for a in range(how_many(who, users)):
         i = which(who, a)
         if memory[i].since == 0:
             continue
@@ -177,8 +179,9 @@ def _outcome(me, plan, users, memory, offenders, table, who):
         smallest = min(smallest, smallest_separation(me, plan, other, HORIZON, STEP))
         if smallest < 0.0:
             break
-        if (offenders >> a) & 1:
-            ends = ends and _is_over(me, plan, other, table)
+        if place < _MOST_AT_ONCE and (offenders >> place) & 1:
+            ends = ends and _is_over(me, plan, other, table_of(table, users[i]))
+        place += 1
     return smallest, ends
 
 
@@ -199,11 +202,11 @@ def _harms_nobody(me, plan, users, memory, table, who):
         i = which(who, a)
         if memory[i].since > 0:
             continue
-        other = _motion_of(users[i], memory[i])
+        other, toward = _motion_of(users[i], memory[i]), table_of(table, users[i])
         if other.v < 0.0:
-            if plan.swerve > 0.0 and not _keeps_aside(me, plan, other, table):
+            if plan.swerve > 0.0 and not _keeps_aside(me, plan, other, toward):
                 return False
-        elif not keeps_clear(me, plan, other, table.ego, table.other, HORIZON, STEP):
+        elif not keeps_clear(me, plan, other, toward.ego, toward.other, HORIZON, STEP):
             return False
     return True
 
@@ -243,7 +246,7 @@ def _returns(wish, ego, users, memory, table, who):
     side = 1.0 if u > 0.0 else -1.0 if u < 0.0 else 0.0
     ahead = Motion(me.x, me.v, me.a, me.y, 0.0, 0.0, me.half_length, me.half_width)
     a_lat, hit = table.ego.a_lat_max_accel, False
-    for a in range(min(how_many(who, users), _MOST_AT_ONCE)):
+    for a in range(how_many(who, users)):
         i = which(who, a)
         if memory[i].since == 0:
             continue

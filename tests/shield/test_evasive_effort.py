@@ -6,6 +6,7 @@ import pytest
 from rss_shield.shield.command import Command
 from rss_shield.shield.definitions.evasion import Motion, follow
 from rss_shield.shield.definitions.response import FRONT, LON
+from rss_shield.shield.ground import CLASSES, of_class
 from rss_shield.shield.lanes.evasion import FAMILY, HORIZON, Room, evade, manoeuvre
 from rss_shield.shield.lanes.limits import always_on
 from rss_shield.shield.lanes.memory import MEMORY
@@ -37,12 +38,12 @@ def remembered(since, broke=KEPT, a=0.0, v=20.0):
     return one
 
 
-def effort(others, room=WIDE, ego=None, evading=False, wish=WISH):
+def effort(others, room=WIDE, ego=None, evading=False, wish=WISH, table=TABLE):
     """others: (`ROAD_USER`, `MEMORY`) pairs."""
     ego = user(0.0, 0.0, 20.0) if ego is None else ego
     users, memory = (np.array([pair[k] for pair in others], kind) for k, kind in ((0, ROAD_USER), (1, MEMORY)))
     bounds = always_on(ego, TABLE.ego, TABLE.rules, TABLE.dt)
-    return evade(wish, evading, ego, users, memory, room, BODY, bounds, TABLE, None)
+    return evade(wish, evading, ego, users, memory, room, BODY, bounds, table, None)
 
 
 def test_without_danger_the_drivers_wish_stays():
@@ -110,6 +111,24 @@ def test_hard_braking_is_not_tried_on_who_follows_closely():
     assert alone.changed and alone.wish.acceleration < -5.0
     followed = effort([ahead, (user(-25.0, 0.0, 20.0), remembered(0))], Room(0.0, 0.0))
     assert not followed.changed
+
+
+def test_a_truck_behind_needs_more_room_than_a_car():
+    # the car gets 23 + 23^2 / 10 m further, and 8 m less than an ego that brakes with 6 m/s^2 from 20 m/s leaves it
+    rows = np.array([TABLE.other, of_class(TABLE.other, CLASSES["truck"], DT)])
+    ahead, follower = (user(40.0, 0.0, 5.0), remembered(3, TOO_SHORT, -6.0)), user(-60.0, 0.0, 20.0)
+    changed = []
+    for kind in (0, 1):
+        follower["kind"] = kind
+        pair = follower.copy(), remembered(0)
+        changed.append(effort([ahead, pair], Room(0.0, 0.0), table=TABLE._replace(others=rows)).changed)
+    assert changed == [True, False]
+
+
+def test_it_finds_who_is_in_danger_among_many_who_are_not():
+    far = user(500.0, 20.0, 20.0), remembered(0)
+    alone, among = effort([ahead_and_aside(1.7)]), effort([far] * 70 + [ahead_and_aside(1.7)])
+    assert alone == among and among.changed
 
 
 def test_once_it_has_moved_over_it_goes_straight_on_while_danger_lasts():
