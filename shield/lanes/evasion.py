@@ -133,7 +133,7 @@ def evade(wish, evading, ego, users, memory, room, body, bounds, table, who=None
 
 @inner
 def _offenders(ego, users, memory, table, who):
-    """(is there danger, set of bits: who makes an evasion owed, is one of them hit else), by place among those in it."""
+    """(is there danger, set of bits: who of those in it makes an evasion owed, is one of them hit else)."""
     me, place, offenders, urgent = _motion_of_ego(ego), 0, 0, False
     for a in range(how_many(who, users)):
         i = which(who, a)

@@ -45,9 +45,17 @@ _TOLERANCE = 1e-6  # rounding, in the unit of each duty
 
 
 @inner
-def blame_ego(memory, duty, excess):
+def is_broken(duty, excess, tolerances):
+    """Was a duty broken by more than rounding, and than is tolerated of it? `tolerances`: `[D]`, None = nothing is."""
+    if tolerances is None:
+        return excess > _TOLERANCE
+    return excess > max(_TOLERANCE, tolerances[duty])
+
+
+@inner
+def blame_ego(memory, duty, excess, tolerances=None):
     """Note that the ego broke a duty, if it did; the first one counts, and the most that it was broken by."""
-    if excess > _TOLERANCE:
+    if is_broken(duty, excess, tolerances):
         if memory.ego_broke == KEPT:
             memory.ego_broke = duty
         if memory.ego_broke == duty:
@@ -55,8 +63,8 @@ def blame_ego(memory, duty, excess):
 
 
 @inner
-def _blame_other(memory, duty, excess):
-    if excess > _TOLERANCE:
+def _blame_other(memory, duty, excess, tolerances):
+    if is_broken(duty, excess, tolerances):
         if memory.other_broke == KEPT:
             memory.other_broke = duty
         if memory.other_broke == duty:
@@ -66,11 +74,11 @@ def _blame_other(memory, duty, excess):
 @compiled
 def judge_motion(memory, ego, user, table, ahead, slack):
     """`judge_motion_in` of cars that a simulator moves by explicit Euler, frame by frame."""
-    judge_motion_in(memory, ego, user, table, ahead, slack, table.dt)
+    judge_motion_in(memory, ego, user, table, ahead, slack, table.dt, None)
 
 
 @compiled
-def judge_motion_in(memory, ego, user, table, ahead, slack, step):
+def judge_motion_in(memory, ego, user, table, ahead, slack, step, tolerances):
     """Hold what each has used of the distance at the threshold against its share, on a dangerous sample.
 
     Args:
@@ -81,6 +89,7 @@ def judge_motion_in(memory, ego, user, table, ahead, slack, step):
       slack: how far the ego's heading may overshoot its share in that extrapolation [m]; it lags
         behind the lateral speed, and `overlap_margin` is there for it.
       step: of explicit Euler [s]; 0 where cars move as cars do, and frames are only when somebody looked.
+      tolerances: see `is_broken`.
     """
     table = table_of(table, user)
     dt = table.dt
@@ -96,18 +105,19 @@ def judge_motion_in(memory, ego, user, table, ahead, slack, step):
             sign = 1.0 if memory.ego_is_rear else -1.0
             b_ego, b_other = head_on_braking(memory.opposite, memory.in_own_lane, table.ego, table.other)
             share = _share_toward(sign * memory.v_ego, table.ego, b_ego, step)
-            blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share)
+            blame_ego(memory, TOO_FAR, sign * travel_ego + longer_ego - share, tolerances)
             share = _share_toward(-sign * memory.v_other, table.other, b_other, step)
-            _blame_other(memory, TOO_FAR, -sign * travel_other + longer_other - share)
+            _blame_other(memory, TOO_FAR, -sign * travel_other + longer_other - share, tolerances)
         elif memory.ego_is_rear:
-            blame_ego(memory, TOO_FAR, travel_ego + longer_ego - _share_rear(tau, memory.v_ego, table.ego, step))
+            share = _share_rear(tau, memory.v_ego, table.ego, step)
+            blame_ego(memory, TOO_FAR, travel_ego + longer_ego - share, tolerances)
             share = _share_front(tau, memory.v_other, table.other, step)
-            _blame_other(memory, TOO_SHORT, share - travel_other + longer_other)
+            _blame_other(memory, TOO_SHORT, share - travel_other + longer_other, tolerances)
         else:
             share = _share_front(tau, memory.v_ego, table.ego, step) - memory.way_back
-            blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego)
+            blame_ego(memory, TOO_SHORT, share - travel_ego + longer_ego, tolerances)
             share = _share_rear(tau, memory.v_other, table.other, step)
-            _blame_other(memory, TOO_FAR, travel_other + longer_other - share)
+            _blame_other(memory, TOO_FAR, travel_other + longer_other - share, tolerances)
         if ahead == 0 and memory.age > 1 and not user.wreck:
             duty, excess = _audit_acceleration(
                 role_of_other(memory),
@@ -117,15 +127,16 @@ def judge_motion_in(memory, ego, user, table, ahead, slack, step):
                 table.other,
                 dt,
             )
-            _blame_other(memory, duty, excess)
+            _blame_other(memory, duty, excess, tolerances)
     if owes(memory, LAT):
         used = memory.approach_ego + max(memory.side * ego.speed * ego.sin, 0.0) * later
         share = approach_no_credit(memory.w_ego, table.ego) + lateral_euler_margin(memory.w_ego, table.ego, step)
-        blame_ego(memory, TOO_CLOSE, used - share - slack)
+        blame_ego(memory, TOO_CLOSE, used - share - slack, tolerances)
         used = memory.approach_other + max(-memory.side * user.speed * user.sin, 0.0) * later
         # a driver may already use the first frame's growth on it; mu has room for that
         first_frame = table.other.a_lat_max_accel * step**2
-        _blame_other(memory, TOO_CLOSE, used - sampled_approach(memory.w_other, table.other, step) - first_frame)
+        excess = used - sampled_approach(memory.w_other, table.other, step) - first_frame
+        _blame_other(memory, TOO_CLOSE, excess, tolerances)
 
 
 @inner
@@ -150,7 +161,7 @@ def _share_toward(v, params, b, dt):
 
 
 @compiled
-def audit_command(memory, ego, command, drift, params, dt):
+def audit_command(memory, ego, command, drift, params, dt, tolerances=None):
     """Did the ego's command keep its duties toward one road user on one dangerous frame?
 
     These are the duties of the threshold (Def. 10) and those of the situation as it is now (hole H23), each with
@@ -163,6 +174,7 @@ def audit_command(memory, ego, command, drift, params, dt):
       drift: lateral speed at which a curved lane leaves its tangent during the frame [m/s].
       params: `RSSParams` of the ego.
       dt: length of the frame [s].
+      tolerances: see `is_broken`.
 
     Returns:
       (duty, excess): index into `DUTIES`, 0 = kept, and how much it was broken by.
@@ -171,26 +183,26 @@ def audit_command(memory, ego, command, drift, params, dt):
         duty, excess = _audit_acceleration(
             role_of_ego(memory), memory.since * dt, ego.speed, command.acceleration, params, dt
         )
-        if duty != KEPT:
+        if is_broken(duty, excess, tolerances):
             return duty, excess
         if role_of_ego(memory) == FRONT and memory.since * dt >= params.response_time - _TOLERANCE:
             excess = slowest_in_danger(ego.speed, params, dt) - (ego.speed + command.acceleration * dt)
-            if excess > _TOLERANCE:
+            if is_broken(REVERSED, excess, tolerances):
                 return REVERSED, excess
     if memory.role_now != FRONT:
         duty, excess = _audit_acceleration(
             memory.role_now, memory.role_for * dt, ego.speed, command.acceleration, params, dt
         )
-        if duty != KEPT:
+        if is_broken(duty, excess, tolerances):
             return duty, excess
     u = ego.speed * np.sin(ego.heading + command.slip) - drift
     if owes(memory, LAT):
         excess = memory.side * u - lateral_speed_limit(memory.since, memory.w_ego, params, dt)
-        if excess > _TOLERANCE:
+        if is_broken(TOWARD, excess, tolerances):
             return TOWARD, excess
     if memory.side_now != 0.0:
         excess = memory.side_now * u - lateral_speed_limit(memory.side_for, memory.w_side, params, dt)
-        if excess > _TOLERANCE:
+        if is_broken(TOWARD, excess, tolerances):
             return TOWARD, excess
     return KEPT, 0.0
 

@@ -97,23 +97,18 @@ def try_pairs(log, touches, who, table, step, tolerances, found, verdicts):
                 continue
             pair = assess(ego, user, table)
             remember(known, pair, ego, user, dt)
-            ego_broke, other_broke = known.ego_broke, known.other_broke
             if known.since > 0:
-                judge_motion_in(known, ego, user, table, NOW, 0.0, step)
+                judge_motion_in(known, ego, user, table, NOW, 0.0, step, tolerances)
             if ends:
                 if known.since > 0:
                     slack = rules.overlap_margin
-                    judge_motion_in(known, ego, user, table, NEXT_FRAME, slack, step)
-                _excuse(known, ego_broke, other_broke, tolerances)
+                    judge_motion_in(known, ego, user, table, NEXT_FRAME, slack, step, tolerances)
                 _write(sum_up(known), t, verdicts[i])
                 continue
-            _excuse(known, ego_broke, other_broke, tolerances)
             cell.duty, cell.excess = KEPT, 0.0
             if known.since > 0 and not np.isnan(log.acceleration[t]):
-                duty, excess = audit_command(known, ego, command, drift, table.ego, dt)
-                if excess > tolerances[duty]:
-                    cell.duty, cell.excess = duty, excess
-                    blame_ego(known, duty, excess)
+                cell.duty, cell.excess = audit_command(known, ego, command, drift, table.ego, dt, tolerances)
+                blame_ego(known, cell.duty, cell.excess, tolerances)
             cell.present, cell.dangerous = True, known.since > 0
             cell.axes, cell.since = known.axes, known.since
             cell.ego_is_rear, cell.opposite = pair.ego_is_rear, pair.opposite
@@ -126,15 +121,6 @@ def try_pairs(log, touches, who, table, step, tolerances, found, verdicts):
             cell.other_broke, cell.other_excess = known.other_broke, known.other_excess
         if ends:
             break
-
-
-@inner
-def _excuse(memory, ego_broke, other_broke, tolerances):
-    """Take back what one of the two has broken on this sample by no more than is tolerated."""
-    if ego_broke == KEPT and memory.ego_excess <= tolerances[memory.ego_broke]:
-        memory.ego_broke, memory.ego_excess = KEPT, 0.0
-    if other_broke == KEPT and memory.other_excess <= tolerances[memory.other_broke]:
-        memory.other_broke, memory.other_excess = KEPT, 0.0
 
 
 @inner
