@@ -17,6 +17,7 @@ from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
 from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
 from rss_shield.shield.ground import STATES, Ground, state_along, table_on, worse_of
+from rss_shield.shield.lanes.closed_roads import go_around, keep_place
 from rss_shield.shield.lanes.controller import Response, find_danger, respond
 from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.evasion import Room, evade
@@ -25,7 +26,7 @@ from rss_shield.shield.lanes.inflation import inflate
 from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
 from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, start_over
-from rss_shield.shield.lanes.pair import ROAD_USER, assess
+from rss_shield.shield.lanes.pair import ROAD_USER
 from rss_shield.shield.lanes.restriction import Body
 from rss_shield.shield.tally import (
     CONTACT,
@@ -403,30 +404,11 @@ class ShieldedEgo:
         return out[:-1], out[-1]
 
     def _go_around(self, users, ego) -> None:
-        """On a closed road everybody is ahead and behind: count where the margin is smaller, unless danger lasts.
-
-        In danger who was ahead stays ahead. Where somebody changes places otherwise, the sample before is taken
-        in again from there.
-        """
-        settings = self.settings
+        """On a closed road everybody is ahead and behind: count where the margin is smaller."""
         ego_before, users_before = self.last[0], self.last[1].copy()
         for i in np.flatnonzero(np.isfinite(users["around"])):
-            around = users["around"][i]
-            known = self.memory["age"][i] > 0 or self.memory["skipped"][i]
-            gap = users_before["s"][i] - ego_before["s"] if known else 0.0
-            places = ego["s"] + (users["s"][i] - ego["s"]) % around - [0.0, around]
-            follows = int(np.argmin(np.abs(places - ego["s"] - gap)))
-            place = follows
-            if self.memory["since"][i] == 0:
-                margins = []
-                for users["s"][i] in places:
-                    margins.append(assess(ego, users[i], settings.table).margin_lon)
-                place = int(np.argmin(margins))
-            users["s"][i] = places[place]
-            if place != follows and known:
-                users_before["s"][i] += places[place] - places[follows]
-                self.jumped[i] = True
-                forget_safe(self.memory[i])
+            around = ego, users[i], ego_before, users_before[i], self.memory[i], self.settings.table
+            self.jumped[i] |= go_around(*around)
         self.last = (ego_before, users_before)
 
     def _meet(self) -> None:
@@ -513,10 +495,8 @@ class ShieldedEgo:
         users, ego = self._measure(self.poses_before, self.earlier)
         for flag in ("wreck", "in_own_lane"):
             users[flag], ego[flag] = users_before[flag], ego_before[flag]
-        closed = np.isfinite(users["around"])  # who was ahead is so still
-        around = users["around"][closed]
-        moved = (users_before["s"] - ego_before["s"] - users["s"] + ego["s"])[closed]
-        users["s"][closed] += around * np.round(moved / around)
+        for user, s in zip(users, users_before["s"], strict=True):
+            keep_place(ego, user, s - ego_before["s"])
         return ego, users
 
     def _roads_along(self, heading: Heading):

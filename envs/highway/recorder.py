@@ -1,6 +1,6 @@
 """An episode of any environment as a trace: who was where on every frame, and what the shields made of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -278,11 +278,18 @@ class Film:
                 "judge_rules": judge.rules._asdict(),
                 "conduct": {name: getattr(shield.options, name) for name in ("entry", "intent", "waiting", "examine")},
                 "traffic": shield.options.traffic,
+                "conditions": _written(shield.options.conditions),
+                "classes": _written(shield.options.classes),
                 "blame": info.get("blame", ""),
                 "dangerous_pairs": info.get("episode_dangerous_pairs", 0),
                 "broken_duties": info.get("episode_broken_duties", 0),
             }
         return meta
+
+
+def _written(option: Any) -> Any:
+    """An option as JSON has it: of a mapping whose keys may be intervals a list of pairs."""
+    return [[key, value] for key, value in option.items()] if isinstance(option, Mapping) else option
 
 
 class _EgoFilm:

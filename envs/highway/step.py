@@ -158,12 +158,17 @@ def audit_of(ego: ShieldedEgo) -> Audit:
 
     Raises:
       ValueError: roads cross, or cars are parked; recorded frames hold distances along a lane, and the duties there
-        are others.
+        are others. Or parameters change with the road or the kind of vehicle: frames do not say which counted when.
     """
     settings, frames = ego.judge.settings, ego.judge.record or []
     if settings.scheme != LANES:
         raise ValueError(
             "audit: expected an environment without junctions; where roads cross or cars are parked, infos count the "
+            "pair-frames: episode_dangerous_pairs, episode_broken_duties"
+        )
+    if ego.judge.ground is not None:
+        raise ValueError(
+            "audit: expected an environment without conditions and classes; where they are given, infos count the "
             "pair-frames: episode_dangerous_pairs, episode_broken_duties"
         )
     return audit(log_of(frames), settings.table)

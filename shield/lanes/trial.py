@@ -8,6 +8,7 @@ import numpy as np
 
 from rss_shield.shield._numba.compiled import compiled_for_arrays, inner, records
 from rss_shield.shield.command import Command
+from rss_shield.shield.lanes.closed_roads import go_around, keep_place
 from rss_shield.shield.lanes.judge import NEXT_FRAME, NOW, audit_command, blame_ego, judge_motion_in, sum_up
 from rss_shield.shield.lanes.memory import (
     MEMORY,
@@ -67,7 +68,7 @@ def try_pairs(log, touches, who, table, step, tolerances, found, verdicts):
     """Judge one road user against some others, sample by sample, up to its first contact.
 
     Args:
-      log: `Log` with N others.
+      log: `Log` with N others; on closed roads their places are changed (`go_around`).
       touches: `[T, N]` bool: they touch, or it is predicted for the next sample.
       who: `[K]` indices of the others that have these parameters.
       table: `Table` in force toward them.
@@ -77,7 +78,7 @@ def try_pairs(log, touches, who, table, step, tolerances, found, verdicts):
       verdicts: `[N]` VERDICT, likewise.
     """
     rules, dt = table.rules, table.dt
-    memory = np.zeros(len(who), MEMORY)
+    memory, gap = np.zeros(len(who), MEMORY), np.zeros(len(who))  # from the ego to each on the last sample [m]
     unknown = np.zeros(1, MEMORY)
     for t in range(len(log.ego)):
         ego = log.ego[t]
@@ -90,9 +91,14 @@ def try_pairs(log, touches, who, table, step, tolerances, found, verdicts):
                 memory[k] = unknown[0]
                 continue
             known, user, cell = memory[k], log.users[t, i], found[t, i]
+            before = log.users_before[t, i]
             if log.jumped[t, i]:
                 forget_safe(known)
-            catch_up(known, log.ego_before[t], log.users_before[t, i], table)
+            if known.age > 0 or known.skipped:
+                keep_place(log.ego_before[t], before, gap[k])
+            go_around(ego, user, log.ego_before[t], before, known, table)
+            gap[k] = user.s - ego.s
+            catch_up(known, log.ego_before[t], before, table)
             if ends and not touches[t, i]:
                 continue
             pair = assess(ego, user, table)

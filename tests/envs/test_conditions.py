@@ -8,10 +8,13 @@ import pytest
 
 from rss_shield import make, make_vec
 from rss_shield.envs.conditions import ground_of, group_of, held, pieces_of, shares_of
+from rss_shield.envs.highway.recorder import record_trace
 from rss_shield.envs.roads.lanes import reach_of, reach_on
+from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.shield.ground import params_at
 from rss_shield.shield.params import GRAVITY, PRESETS, ROADS, Rules
 from rss_shield.shield.table import table_for
+from rss_shield.shield.trace import load, save
 
 TABLE = table_for(PRESETS["simulator"], Rules(), 0.2)
 PATCHES = {(250.0, 330.0): "ice", (400.0, 500.0): "wet"}
@@ -53,6 +56,16 @@ def test_nonsense_is_refused_by_name(options, message):
     for build in (make, lambda env_id, **given: make_vec(env_id, 1, **given)):
         with pytest.raises(ValueError, match=message):
             build("highway-fast-v0", **options)
+
+
+def test_logs_say_that_parameters_changed_and_are_not_audited(tmp_path):
+    env = make("highway-fast-v0", "monitor", record=True, **MIXED)
+    save(record_trace(env, lambda _: 3, seed=0), tmp_path / "ice.npz")
+    with pytest.raises(ValueError, match="without conditions and classes"):
+        env.audit()
+    trace = load(tmp_path / "ice.npz")
+    assert trace.meta["conditions"] == [[[250.0, 330.0], "ice"], [[400.0, 500.0], "wet"]]
+    assert any("judged by one table" in note for note in judge_trace(trace).notes)
 
 
 def test_what_has_no_shield_or_no_lanes_is_refused():

@@ -9,7 +9,7 @@ import pytest
 from rss_shield import make
 from rss_shield.cli import main
 from rss_shield.envs.highway.hostile import HOSTILE
-from rss_shield.envs.highway.recorder import record_trace
+from rss_shield.envs.highway.recorder import Film, record_trace
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.lanes import see_all, table_of
 from rss_shield.shield.params import PRESETS
@@ -68,6 +68,34 @@ def test_verdicts_agree_where_roads_cross(env_id, seeds):
     found = [agrees(recorded(env_id, "monitor", seed)) for seed in seeds]
     agrees(recorded(env_id, "override", seeds[0]))
     assert env_id == "roundabout-v0" or sum(found) >= 1
+
+
+def test_on_a_ring_who_follows_across_its_seam_is_behind():
+    """The lanes of a racetrack begin anew somewhere: 12 m behind the ego there is not 365 m ahead."""
+    env = make("racetrack-v0", "monitor", config={"other_vehicles": 1, "duration": 3, "controlled_vehicles": 1})
+    env.reset(seed=0)
+    road, network = env.unwrapped.road, env.unwrapped.road.network
+    ego, other = env.unwrapped.vehicle, next(v for v in road.vehicles if v is not env.unwrapped.vehicle)
+    before = next(index for index in network.lanes_dict() if index[1] == "a" and index[2] == 0)
+    for vehicle, index, s, speed in (
+        (ego, ("a", "b", 0), 2.0, 5.0),
+        (other, before, network.get_lane(before).length - 10.0, 12.0),
+    ):
+        lane = network.get_lane(index)
+        vehicle.position, vehicle.heading, vehicle.speed = lane.position(s, 0.0), lane.heading_at(s), speed
+        vehicle.lane_index, vehicle.lane = index, lane
+    film, ended, info = Film(env, 0), False, {}
+    while not ended:
+        _, _, terminated, truncated, info = env.step(np.zeros(env.action_space.shape))
+        film.look_for_contacts()
+        ended = terminated or truncated
+    trace = film.develop(info)
+    frames = see_all(trace, table_of(trace), [0])[0].frames
+    row = next(row for row in range(len(trace.users.ids)) if row != trace.ego_users[0])
+    assert -20.0 < trace.users.x[0, row] - trace.users.x[0, 0] < 0.0
+    assert not frames["ego_is_rear"][0, row] and 5.0 < frames["gap_lon"][0, row] < 7.0  # less what boxes grow in bends
+    assert frames["dangerous"].sum() == trace.meta["dangerous_pairs"] > 0
+    agrees(trace)
 
 
 def test_dangerous_pairs_and_broken_duties_are_counted_as_the_shield_counts_them():

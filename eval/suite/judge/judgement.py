@@ -201,6 +201,11 @@ def _notes(trace: Trace, noise: Noise) -> tuple[str, ...]:
     unlike = sorted(set(trace.users.kinds) & {"pedestrian", "bicycle"})
     if unlike:
         notes.append(f"there is a {' and a '.join(unlike)}: judged by the rules for cars, of which not all fit")
+    if trace.meta.get("conditions") or trace.meta.get("classes"):
+        notes.append(
+            "parameters changed with the road or the kind of vehicle: all are judged by one table, that of the ego "
+            "where the log ends and that of cars"
+        )
     if not trace.lanes:
         notes.append("the log has no lanes: everybody is taken to drive along one straight road")
     return tuple(notes)
