@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rss_shield.shield.geometry import largest_half_extents, locate, make_road, wrap_angle
+from rss_shield.shield.geometry import box_of, locate, make_road, wrap_angle
 from rss_shield.shield.lanes.frame import to_lane_frame_all
 from rss_shield.shield.lanes.pair import ROAD_USER
 from rss_shield.shield.params import Rules
@@ -205,11 +205,8 @@ def _boxes(trace: Trace) -> np.ndarray:
     users, rules = trace.users, trace.meta.get("rules", {})
     bound = float(rules.get("heading_bound", Rules().heading_bound))
     bend = max((abs(arc[3]) for lane in trace.lanes for arc in _arcs(lane)), default=0.0)
-    rows = []
-    for kind, length, width in zip(users.kinds, users.length, users.width, strict=True):
-        angle = 1.0 if kind == "obstacle" else max(bound, min(bend * length / 2, 0.9))
-        rows.append((length, width, *largest_half_extents(length, width, angle)))
-    return np.array(rows)
+    everybody = zip(users.length, users.width, users.kinds, strict=True)
+    return np.array([box_of(length, width, bound, bend, kind != "obstacle") for length, width, kind in everybody])
 
 
 def _heads_for(trace: Trace, user: int) -> np.ndarray:

@@ -194,6 +194,25 @@ def largest_half_extents(length, width, heading_bound):
     return along, across
 
 
+_MOST_TURNED = 0.9  # sine of the angle by which a bend may turn a car against its lane
+
+
+def box_of(
+    length: float, width: float, heading_bound: float, curvature: float, driven: bool = True
+) -> tuple[float, float, float, float]:
+    """Length and width, and the largest half extents that its driver may use along and across the lane [m].
+
+    In a tight bend a car that keeps to its lane is at a larger angle to it than the bound.
+
+    Args:
+      heading_bound: as in `largest_half_extents`.
+      curvature: of the tightest bend of the road, >= 0 [1/m].
+      driven: obstacles have no driver, who would promise anything.
+    """
+    bound = max(heading_bound, min(curvature * length / 2, _MOST_TURNED)) if driven else 1.0
+    return length, width, *largest_half_extents(length, width, bound)
+
+
 @compiled
 def signed_gap(distance, half_1, half_2):
     """Bumper-to-bumper gap along one axis [m]; negative where the boxes overlap on it."""

@@ -40,7 +40,7 @@ from rss_shield.shield._numba.compiled import inner, part, rare
 from rss_shield.shield.comfort import ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
-from rss_shield.shield.geometry import largest_half_extents
+from rss_shield.shield.geometry import box_of
 from rss_shield.shield.junctions.controller import has_plan, junction_frame
 from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.judge import judge_crossing
@@ -64,8 +64,6 @@ from rss_shield.shield.tally import (
     start_episode,
 )
 from rss_shield.shield.verdicts import charges_ego, weight_of
-
-_MOST_TURNED = 0.9  # sine of the angle by which a bend may turn a car against its lane
 
 
 class Ways(NamedTuple):
@@ -111,12 +109,9 @@ def _choices(junction: Junction, network, net: Network) -> np.ndarray:
 
 def make_watch(heading_bound, curvature=0.0):
     """Tables for a `heading_bound` as in `Rules`, and the tightest bend of the roads [1/m]."""
-    bound = max(heading_bound, min(curvature * CAR_LENGTH / 2, _MOST_TURNED))
-    boxes = np.zeros((2, 4))
-    boxes[0, 0], boxes[0, 1] = CAR_LENGTH, CAR_WIDTH
-    boxes[0, 2], boxes[0, 3] = largest_half_extents(CAR_LENGTH, CAR_WIDTH, bound)
-    boxes[1, 0], boxes[1, 1] = OBSTACLE_SIZE, OBSTACLE_SIZE
-    return Watch(boxes, np.zeros(1, MEMORY), np.zeros(1, CROSSING), MAX_SLIP)
+    bounds = heading_bound, curvature
+    boxes = [box_of(CAR_LENGTH, CAR_WIDTH, *bounds), box_of(OBSTACLE_SIZE, OBSTACLE_SIZE, *bounds, driven=False)]
+    return Watch(np.array(boxes), np.zeros(1, MEMORY), np.zeros(1, CROSSING), MAX_SLIP)
 
 
 # Of the next two one is None, or all three are, and numba leaves out of the kernel what it would need.

@@ -27,7 +27,7 @@ from rss_shield.shield.geometry import (
     SIN,
     X,
     Y,
-    largest_half_extents,
+    box_of,
 )
 from rss_shield.shield.lanes.frame import to_lane_frame
 from rss_shield.shield.risk import KNOWN_SAFE, UNKNOWN, RiskSettings, neighbours, scene_risk, toward_leader
@@ -94,11 +94,8 @@ class Meter(NamedTuple):
 def compile_field(network, risk: RiskSettings, settings: Settings) -> Field:
     """What does not change on a `highway_env.road.road.RoadNetwork`."""
     eta = [[weight_of(line_beside(network, index, side), risk) for side in (-1, 1)] for index in network.lanes_dict()]
-    bound = max(settings.table.rules.heading_bound, min(tightest(network) * CAR_LENGTH / 2, 0.9))
-    boxes = [
-        (length, width, *largest_half_extents(length, width, angle))
-        for length, width, angle in ((CAR_LENGTH, CAR_WIDTH, bound), (OBSTACLE_SIZE, OBSTACLE_SIZE, 1.0))
-    ]
+    bounds = settings.table.rules.heading_bound, tightest(network)
+    boxes = [box_of(CAR_LENGTH, CAR_WIDTH, *bounds), box_of(OBSTACLE_SIZE, OBSTACLE_SIZE, *bounds, driven=False)]
     return Field(risk, np.array(eta), np.array(boxes), settings.table.dt)
 
 

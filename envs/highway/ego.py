@@ -15,7 +15,7 @@ from rss_shield.shield._numba.compiled import records
 from rss_shield.shield.comfort import RIDE, gap_ahead, ride_on
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
-from rss_shield.shield.geometry import PIECE_FIELDS, largest_half_extents
+from rss_shield.shield.geometry import PIECE_FIELDS, box_of
 from rss_shield.shield.ground import STATES, Ground, state_along, table_on, worse_of
 from rss_shield.shield.lanes.closed_roads import go_around, keep_place
 from rss_shield.shield.lanes.controller import Response, find_danger, respond
@@ -471,7 +471,8 @@ class ShieldedEgo:
         self.poses_before, self.before, self.earlier = poses, before, earlier
         self.last = (self.last[0], last)
         bound, bend = self.settings.table.rules.heading_bound, tightest(self.vehicle.road.network)
-        self.boxes = np.array([_box(v, bound, bend) for v in [*others, self.vehicle]])
+        everybody = [*others, self.vehicle]
+        self.boxes = np.array([box_of(v.LENGTH, v.WIDTH, bound, bend, hasattr(v, "action")) for v in everybody])
 
     def _choose_frame(self) -> None:
         """Measure along the road that the ego drives. Where that jumps, so does the sample before."""
@@ -580,12 +581,3 @@ class ShieldedEgo:
             return False
         touching, will_touch, _ = first._is_colliding(second, self.settings.table.dt)
         return bool(touching or will_touch)
-
-
-def _box(user, heading_bound: float, curvature: float) -> tuple[float, float, float, float]:
-    """Length and width, and the largest half extents that its driver may use; obstacles have no driver [m].
-
-    In a tight bend a car that keeps to its lane is at a larger angle to it than the bound.
-    """
-    bound = max(heading_bound, min(curvature * user.LENGTH / 2, 0.9)) if hasattr(user, "action") else 1.0
-    return user.LENGTH, user.WIDTH, *largest_half_extents(user.LENGTH, user.WIDTH, bound)

@@ -5,11 +5,7 @@ the same. Nobody drives with these here: they are for reading, and for the tests
 """
 
 from rss_shield.shield._numba.compiled import compiled, compiled_for_arrays
-from rss_shield.shield.junctions.plans import NEVER, follows, meets, step, throttle
-
-_REST = 1e-9  # below this speed a plan has come to rest [m/s]
-_LONGEST = 150  # frames of a throttle phase, at most
-_TAIL = 3  # frames between two moments at which a go plan may begin to brake
+from rss_shield.shield.junctions.plans import LONGEST, NEVER, NEXT, REST, TAIL, follows, meets, step, throttle
 
 
 @compiled
@@ -38,7 +34,7 @@ def is_met(scene, s, v, n, only, slack, resting):
 @compiled
 def stop_frame_by_frame(scene, s, v, n, brake, only, slack):
     """Frame on which somebody is met by an ego that brakes from frame `n` on; `NEVER` if nobody is."""
-    while v > _REST:
+    while v > REST:
         if is_met(scene, s, v, n, only, slack, False):
             return n
         s, v = step(s, v, -brake, scene.table.dt)
@@ -54,13 +50,15 @@ def go_frame_by_frame(scene, a, only, slack):
     for k in range(len(threats)):
         threats[k].left = NEVER
     before = threats.left.copy()
-    for n in range(1, _LONGEST):
+    n = NEXT
+    while n * dt < LONGEST:
         if is_met(scene, s, v, n, only, slack, False):
             return -1
-        if n % _TAIL == _TAIL - 1:
+        if n % TAIL == TAIL - 1:
             before[:] = threats.left
             if stop_frame_by_frame(scene, s, v, n, scene.table.ego.a_min_brake, only, slack) == NEVER:
                 return n - 1
             threats.left[:] = before
         s, v = step(s, v, throttle(scene, s, v), dt)
+        n += 1
     return -1

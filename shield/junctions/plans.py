@@ -45,10 +45,10 @@ PATIENCE = (15.0, 5.0, 5.0)  # by `entry`: cautious, priority, assertive [s]
 START_UP = 2.5  # from when the ego has no other plan [s]
 
 SLACK = 0.2  # a new plan stays clear even if the ego is this far off; one in force only has to stay clear [m]
-_TAIL = 3  # frames between two moments at which a go plan may begin to brake
-_LONGEST = 10.0  # throttle phase of a plan, at most [s]
+TAIL = 3  # frames between two moments at which a go plan may begin to brake
+LONGEST = 10.0  # throttle phase of a plan, at most [s]
 _BETWEEN = 3.0  # cars that follow each other are in each other's way with so much between them, margins included [m]
-_REST = 1e-9  # below this speed a plan has come to rest [m/s]
+REST = 1e-9  # below this speed a plan has come to rest [m/s]
 _STRIDE = 8  # frames of a plan that are looked at together
 _FEW = 250.0  # frames, in which rounding ...
 _ROUNDING = 1e-9  # ... moves a place by less than this [m] ...
@@ -342,13 +342,13 @@ def _rest(scene, s, v, n, brake, slack):
     In closed form, and frame by frame where the difference by rounding might matter to `meets`.
     """
     dt = scene.table.dt
-    frames = (v - _REST) / (brake * dt)
+    frames = (v - REST) / (brake * dt)
     whole = max(np.ceil(frames), 0.0)
     s_rest = s + dt * whole * (v - 0.5 * brake * dt * (whole - 1.0))
     doubtful = whole > _FEW or abs(frames - np.rint(frames)) < _UNSURE or scene.track.beside >= 0
     if doubtful or _is_at_edge(s_rest - slack) or _is_at_edge(s_rest + slack):
         s_rest = s
-        while v > _REST:
+        while v > REST:
             s_rest, v = step(s_rest, v, -brake, dt)
             n += 1
         return s_rest, n
@@ -425,7 +425,7 @@ def _meets_braking(scene, s, v, n, n_rest, brake, until, slack, threat, falls_be
                 n += _STRIDE
                 continue
             single_until = n + _STRIDE
-        t, resting = n * scene.table.dt, v <= _REST
+        t, resting = n * scene.table.dt, v <= REST
         if falls_behind and _may_follow(scene, s, threat) and follows(scene, s, v, threat, t):
             return NEVER
         if (resting or n >= threat.free_until) and meets(scene, s, slack, threat, t, resting):
@@ -479,7 +479,7 @@ def first_met(scene, a, brake):
     begin(scene)
     s, v = step(scene.track.s, scene.track.v, a, scene.table.dt)
     n = NEXT
-    while n * scene.table.dt < _LONGEST:
+    while n * scene.table.dt < LONGEST:
         if _meets_anyone(scene, s, v, n, EVERYBODY, 0.0):
             return n
         s, v = step(s, v, -brake, scene.table.dt)
@@ -504,10 +504,10 @@ def go_plan_past(scene, a, only, at_line, slack, place):
     begin(scene)
     s, v = step(scene.track.s, scene.track.v, a, scene.table.dt)
     n, latest = NEXT, NOW
-    while n * scene.table.dt < _LONGEST:
+    while n * scene.table.dt < LONGEST:
         if _meets_anyone(scene, s, v, n, only, slack):
             return -1, max(latest, n)
-        if n % _TAIL == 2 and s + stopping_distance(v, scene.table.ego.a_min_brake) >= place:
+        if n % TAIL == TAIL - 1 and s + stopping_distance(v, scene.table.ego.a_min_brake) >= place:
             conflict = tail_conflict(scene, s, v, n, scene.table.ego.a_min_brake, only, at_line, slack)
             if conflict == NEVER:
                 return n - 1, NEVER

@@ -18,7 +18,7 @@ from rss_shield.envs.roads.lanes import (
     tightest,
 )
 from rss_shield.envs.roads.traced_lane import TracedLane
-from rss_shield.shield.geometry import largest_half_extents
+from rss_shield.shield.geometry import box_of
 from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame_all
 from rss_shield.shield.lanes.judge import Log
 from rss_shield.shield.lanes.pair import ROAD_USER
@@ -174,11 +174,9 @@ def _view(world, i: int, start: int, end: int, table: Table, slip) -> View:
 
 
 def _box(trace: Trace, j: int, heading_bound: float, curvature: float) -> tuple[float, float, float, float]:
-    """Length and width, and the largest half extents that its driver may use; obstacles have no driver [m]."""
-    length, width = float(trace.users.length[j]), float(trace.users.width[j])
-    driven = trace.users.kinds[j] != "obstacle"
-    bound = max(heading_bound, min(curvature * length / 2, 0.9)) if driven else 1.0
-    return length, width, *largest_half_extents(length, width, bound)
+    users = trace.users
+    driven = users.kinds[j] != "obstacle"
+    return box_of(float(users.length[j]), float(users.width[j]), heading_bound, curvature, driven)
 
 
 # ---------------------------------------------------------------- road networks
