@@ -308,10 +308,15 @@ def result(name: str, policy: str, frame: pd.DataFrame, bare: pd.DataFrame | Non
         str(int(frame["contact"].sum())),
         f"{spaced(int(frame['broken_duties'].sum()))} / {spaced(int(frame['dangerous_pairs'].sum()))}",
         f"{100 * frame['override_share'].mean():.0f} %",
-        "–" if bare is None else str(int(bare["blame"].isin(AT_FAULT).sum())),
-        "–" if bare is None else str(int(bare["contact"].sum())),
+        "–" if bare is None else _count(bare["blame"].isin(AT_FAULT), n),
+        "–" if bare is None else _count(bare["contact"], n),
         str(frame["backend"].iloc[0]),
     ]
+
+
+def _count(flags: pd.Series, n: int) -> str:
+    """How many episodes; of how many, where that is not `n`."""
+    return f"{int(flags.sum())}" if len(flags) == n else f"{int(flags.sum())} of {len(flags)}"
 
 
 def found(name: str, policy: str, mode: str, out: Path) -> pd.DataFrame | None:

@@ -94,6 +94,7 @@ def row(name: str, traffic: str, played: pd.DataFrame) -> tuple[Any, ...]:
     earned, fast = (bootstrap_mean(played[column], rng) for column in ("return", "speed"))
     to_blame, crashed = int(played["blame"].isin(AT_FAULT).sum()), int(played["crashed"].sum())
     _, low, high, *_ = clopper_pearson(to_blame, n)
+    inherited = int((played["blame"] == "inherited").sum())
     broken, pairs = int(played["broken_duties"].sum()), int(played["dangerous_pairs"].sum())
     return (
         name,
@@ -102,14 +103,14 @@ def row(name: str, traffic: str, played: pd.DataFrame) -> tuple[Any, ...]:
         f"{fast.value:.1f} [{fast.low:.1f}, {fast.high:.1f}]",
         f"{earned.value:.1f} [{earned.low:.1f}, {earned.high:.1f}]",
         f"{100 * played['override_share'].mean():.0f} %",
-        crashed,
+        f"{crashed} ({inherited})" if inherited else crashed,
         f"{to_blame} [{100 * low:.1f} %, {100 * high:.1f} %]",
         f"{spaced(broken)} / {spaced(pairs)}",
     )
 
 
 def episodes_part(config: Config) -> str:
-    measured = "speed [m/s]", "return", "overridden", "contacts", "at fault", "broken / in danger"
+    measured = "speed [m/s]", "return", "overridden", "contacts (inherited)", "at fault", "broken / in danger"
     rows: list[Any] = [("road", "traffic", "episodes", *measured)]
     for name, options in ROWS.items():
         rows.append(row(name, "stock", play(options, config.episodes)))
@@ -121,8 +122,9 @@ def episodes_part(config: Config) -> str:
     words = (
         "Stock drivers keep their distances whatever the road is like, but do no more than its grip admits; compliant "
         "ones, where they are played, go by the same table. *Broken / in danger*: pair-frames on which the ego broke a "
-        "duty, of those in danger. Means with 95 % intervals of the bootstrap over episodes, shares at fault with "
-        "those of Clopper and Pearson."
+        "duty, of those in danger. In brackets those contacts that were inherited: episodes begin with gaps that would "
+        "do on a dry road, from which nobody can brake in time on ice. Means with 95 % intervals of the bootstrap over "
+        "episodes, shares at fault with those of Clopper and Pearson."
     )
     return "\n\n".join(["## Episodes", words, markdown(rows)])
 
