@@ -69,6 +69,18 @@ class Comfort(NamedTuple):
     mean_time_gap: float  # over the frames with less than 5 s; 100 if there were none
 
 
+@inner
+def start_ride(ride):
+    """Forget how the ride felt."""
+    ride.samples = ride.uncomfortable = ride.hard = ride.brakings = ride.gaps = 0
+    ride.distance = ride.least_gap = ride.sum_of_gaps = 0.0
+    for quantity in range(len(ride.squares)):
+        ride.squares[quantity] = 0.0
+        ride.bin[quantity] = ride.above[quantity] = 0
+        for b in range(ride.counts.shape[1]):
+            ride.counts[quantity, b] = 0
+
+
 @compiled
 def ride_on(ride, speed, heading, gap, dt):
     """Take in one sample of a ride, in place.

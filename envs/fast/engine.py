@@ -16,21 +16,17 @@ from rss_shield.envs.compiled import kernel, unfolded
 from rss_shield.envs.conditions import group_of, held
 from rss_shield.envs.decisions.foresight import without_anticipation
 from rss_shield.envs.fast.config import Scenario
+from rss_shield.envs.fast.crossings import Plans, Ways, carry_over, compile_ways, plans_of
 from rss_shield.envs.fast.draws import load_generator
 from rss_shield.envs.fast.envs.intersection import let_traffic_flow, open_intersection
 from rss_shield.envs.fast.following import follow
 from rss_shield.envs.fast.foresight import foresee, make_desk
 from rss_shield.envs.fast.frame import act, look_around, survey, think
 from rss_shield.envs.fast.guard import (
-    Plans,
-    Ways,
-    carry_over,
-    compile_ways,
     cost_of,
     distances_of,
     guard,
     make_watch,
-    plans_of,
     report,
     ride_of,
     start_judging,
@@ -204,7 +200,7 @@ def _go_on(e, cars, episode, order, world, plans, watch, flow, seats):
         was_ego = episode.ego
         let_traffic_flow(cars, episode, order, world.network, world.config[0], flow[0], world.linear)
         if plans is not None:
-            carry_over(episode, cars, plans.crossings, was_ego, watch)
+            carry_over(episode, cars, plans.crossings, was_ego, watch.blank_crossing)
         move_seats(e, cars, episode, world, watch, seats)
 
 

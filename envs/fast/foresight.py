@@ -11,9 +11,10 @@ from rss_shield.envs.compiled import kernel
 from rss_shield.envs.decisions.foresight import Aim, Seen, Stage, first_response, make_stage, within
 from rss_shield.envs.decisions.junctions import first_override
 from rss_shield.envs.decisions.masks import allow
+from rss_shield.envs.fast.crossings import Plans, scene_of
 from rss_shield.envs.fast.drivers import take_meta_action
 from rss_shield.envs.fast.frame import survey
-from rss_shield.envs.fast.guard import Plans, is_refused, scene_of
+from rss_shield.envs.fast.lane_changes import is_refused
 from rss_shield.envs.fast.neighbours import Distances, Past, make_past, measure, row_before, stand_on
 from rss_shield.envs.fast.senses import GHOSTS, aware_of, look
 from rss_shield.envs.fast.sight import project

@@ -9,17 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rss_shield.envs.fast.crossings import carry_over, plans_of
 from rss_shield.envs.fast.drivers import take_meta_action
-from rss_shield.envs.fast.guard import (
-    carry_over,
-    cost_of,
-    guard,
-    plans_of,
-    refuse_lane_change,
-    report,
-    ride_of,
-    start_watch,
-)
+from rss_shield.envs.fast.guard import cost_of, guard, report, ride_of, start_watch
+from rss_shield.envs.fast.lane_changes import refuse_lane_change
 from rss_shield.envs.fast.risk import RISK, begin_looks, meter_of, report_risk, start_risk
 from rss_shield.envs.fast.state import EPISODE, STEP, TRAFFIC
 from rss_shield.envs.fast.tasks import is_terminated, is_terminated_together, rate
@@ -264,7 +257,7 @@ def move_seats(e, cars, episode, world, watch, seats):
 @inner
 def _carry(episode, cars, plans, watch):
     if plans is not None:
-        carry_over(episode, cars, plans.crossings, cars[episode.ego].was, watch)
+        carry_over(episode, cars, plans.crossings, cars[episode.ego].was, watch.blank_crossing)
 
 
 @part
