@@ -100,11 +100,11 @@ def plot_front(table: pd.DataFrame, axes: list[str], safety: str, performance: s
     rows = -(-len(groups) // columns)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.8, 0.8 + 3.4 * rows))
-        panels = figure.subplots(rows, columns, squeeze=False).flat
-        for plot, (label, numbers) in zip(panels, groups, strict=False):
+        panels = iter(figure.subplots(rows, columns, squeeze=False).flat)
+        for (label, numbers), plot in zip(groups, panels, strict=False):  # groups first: a panel drawn is a panel used
             _panel(plot, table.iloc[numbers], [name for name in axes if name not in APART], safety, performance)
             plot.set_title(label, loc="left")
-        for plot in list(panels):
+        for plot in panels:
             plot.set_axis_off()
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
