@@ -34,7 +34,7 @@ from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.envs.fast.config import Unsupported
 from rss_shield.envs.highway.idm_ego import make_idm_vec
 from rss_shield.envs.make_vec import BACKENDS
-from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, default_preset, scheme_of
+from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, scheme_of
 from rss_shield.eval import drivers, removal
 from rss_shield.eval.arms import FROM_OPTIONS, SHIELDED, Arm, arm_named, table
 from rss_shield.eval.config_option import HYPERPARAMETERS, Keys, split_arguments, with_values
@@ -45,7 +45,7 @@ from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import changes, open_run, recorded
 from rss_shield.eval.suite import showcase
-from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
+from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in, usual_preset
 from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
@@ -605,9 +605,7 @@ def preset_name(config: Config) -> str:
     """The preset asked for, or the one of the environment."""
     if config.preset != "auto":
         return config.preset
-    env = rss_shield.make(config.env_id, shield=None)
-    env.close()
-    return default_preset(env.unwrapped)
+    return usual_preset(config.env_id)
 
 
 def resolve(config: Config) -> Preset:
