@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
 import numpy as np
@@ -94,6 +94,10 @@ LONGEST_NAME = 120
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
 FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
 DEFAULT_RULES = Rules()
+PRESET_HELP = (
+    f"RSS parameters by name: {', '.join(PRESETS)}; auto: intersection at intersections, parking on car parks, "
+    "simulator elsewhere; or a file of your own."
+)
 # options of the shield that have no place of their own in `setting`
 WRAPPED = ("rules", "examine", "traffic", "filter", "filter_at", "correction", "replace", "risk")
 FIRST_REMOVAL_SEED = 2 * 10**9  # likewise of the tests on the way, far from both
@@ -119,9 +123,7 @@ class Config:
     """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 8192 for PPO."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds; each trains every arm once."""
-    preset: str = "auto"
-    """RSS parameters by name: simulator, intersection, slides, ad-rss, carla, rodionova-conservative,
-    rodionova-assertive; auto: intersection at intersections, simulator elsewhere; or a file of your own."""
+    preset: Annotated[str, tyro.conf.arg(help=PRESET_HELP)] = "auto"
     ego: Overrides = NO_OVERRIDES
     """RSS parameters of the ego that replace the preset's."""
     other: Overrides = NO_OVERRIDES
