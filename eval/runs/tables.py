@@ -14,7 +14,7 @@ from rss_shield.eval.files import atomic, write_text
 from rss_shield.eval.metrics import Metric
 from rss_shield.eval.plots import STYLE
 from rss_shield.eval.runs.points import APART, groups_of, metric_named, with_front
-from rss_shield.eval.table import rounded
+from rss_shield.eval.table import markdown, rounded
 
 SHOWN = ("crash", "at_fault", "success", "return", "own_return", "speed", "override_share", "rms_jerk", "min_ttc")
 FRONT, BEATEN = "#0072B2", "#999999"
@@ -66,8 +66,7 @@ def _plain(value: Any) -> str:
 
 
 def markdown_of(frame: pd.DataFrame) -> str:
-    lines = [list(frame.columns), ["---"] * len(frame.columns), *frame.to_numpy().tolist()]
-    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
+    return markdown([list(frame.columns), *frame.to_numpy().tolist()])
 
 
 def write_points(folder: Path, points: pd.DataFrame, axes: list[str], safety: str, performance: str, title: str) -> str:
@@ -130,7 +129,7 @@ def _panel(plot: Axes, table: pd.DataFrame, axes: list[str], safety: str, perfor
     plot.set_ylabel(f"{y.label} [{y.unit}]" if y.unit else y.label)
 
 
-NEAR = 0.04  # of what a panel shows: labels that are nearer than this in both directions would cover each other
+NEAR = 0.04  # of the front's extent: points that are nearer than this in both directions share a label
 
 
 def labels_of(front: pd.DataFrame, axes: list[str], x: Metric, y: Metric) -> list[tuple[tuple[float, float], str]]:
