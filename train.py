@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
 import numpy as np
@@ -34,7 +34,7 @@ from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.envs.fast.config import Unsupported
 from rss_shield.envs.highway.idm_ego import make_idm_vec
 from rss_shield.envs.make_vec import BACKENDS
-from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, default_preset, scheme_of
+from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, scheme_of
 from rss_shield.eval import drivers, removal
 from rss_shield.eval.arms import FROM_OPTIONS, SHIELDED, Arm, arm_named, table
 from rss_shield.eval.config_option import HYPERPARAMETERS, Keys, split_arguments, with_values
@@ -45,7 +45,7 @@ from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import changes, open_run, recorded
 from rss_shield.eval.suite import showcase
-from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
+from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in, usual_preset
 from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
@@ -94,6 +94,10 @@ LONGEST_NAME = 120
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
 FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
 DEFAULT_RULES = Rules()
+PRESET_HELP = (
+    f"RSS parameters by name: {', '.join(PRESETS)}; auto: intersection at intersections, parking on car parks, "
+    "simulator elsewhere; or a file of your own."
+)
 # options of the shield that have no place of their own in `setting`
 WRAPPED = ("rules", "examine", "traffic", "filter", "filter_at", "correction", "replace", "risk")
 FIRST_REMOVAL_SEED = 2 * 10**9  # likewise of the tests on the way, far from both
@@ -119,9 +123,7 @@ class Config:
     """Decisions to learn from, per arm and seed; rounded up to whole rollouts of about 8192 for PPO."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Training seeds; each trains every arm once."""
-    preset: str = "auto"
-    """RSS parameters by name: simulator, intersection, slides, ad-rss, carla, rodionova-conservative,
-    rodionova-assertive; auto: intersection at intersections, simulator elsewhere; or a file of your own."""
+    preset: Annotated[str, tyro.conf.arg(help=PRESET_HELP)] = "auto"
     ego: Overrides = NO_OVERRIDES
     """RSS parameters of the ego that replace the preset's."""
     other: Overrides = NO_OVERRIDES
@@ -605,9 +607,7 @@ def preset_name(config: Config) -> str:
     """The preset asked for, or the one of the environment."""
     if config.preset != "auto":
         return config.preset
-    env = rss_shield.make(config.env_id, shield=None)
-    env.close()
-    return default_preset(env.unwrapped)
+    return usual_preset(config.env_id)
 
 
 def resolve(config: Config) -> Preset:

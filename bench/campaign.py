@@ -23,6 +23,7 @@ from typing import NamedTuple
 from rss_shield.agents.slim import write_slim
 from rss_shield.eval.arms import ARMS
 from rss_shield.eval.paper.agents import write
+from rss_shield.shield.filters.answer import FILTERS, RSS
 
 ROOT = Path(__file__).parents[1]
 HIGHWAY, INTERSECTION = "highway-fast-v0", "intersection-v0"
@@ -30,7 +31,7 @@ MAIN = ("unshielded", "shielded", "change-penalty-0.05", "adaptive-penalty", "ma
 SCRIPTED = tuple(arm.name for arm in ARMS.values() if arm.scripted)
 PENALTIES = tuple(name for name in ARMS if "penalty-0" in name or name == "penalty-1")
 VARIANTS = ("reward-shaping", "adaptive-share", "proactive", "executed-action", "sailr")
-FILTERS = ("ttc", "distance-45m", "cbf", "limits", "literal-def10")  # along lanes only
+RIVALS = tuple(name for name in FILTERS if name != FILTERS[RSS])  # along lanes only
 Q_LEARNERS = ("dqn", "dqn-shielded", "executed-action-dqn", "qr-dqn", "qr-dqn-shielded", "semantic-dqn")
 CONTINUOUS = ("sac", "sac-replaced", "sac-projected")  # in the engine on motorways only
 LONG = 30  # [s] of an episode at the intersection
@@ -51,7 +52,7 @@ OTHERS = tuple(name for name in (*PENALTIES, *VARIANTS) if name not in MAIN)
 PARTS = (
     Part("highway-main", HIGHWAY, MAIN, 1_000_000, 10),
     Part("highway-scripted", HIGHWAY, SCRIPTED, 1, 1),
-    Part("highway-others", HIGHWAY, (*OTHERS, *FILTERS), 1_000_000, 5),
+    Part("highway-others", HIGHWAY, (*OTHERS, *RIVALS), 1_000_000, 5),
     Part("highway-off-policy", HIGHWAY, (*Q_LEARNERS, *CONTINUOUS), 200_000, 5),
     Part("intersection-main", INTERSECTION, MAIN, 500_000, 10),
     Part("intersection-scripted", INTERSECTION, SCRIPTED, 1, 1),

@@ -31,6 +31,7 @@ from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.idm_ego import make_idm
 from rss_shield.envs.options import Settings
 from rss_shield.eval.files import write_text
+from rss_shield.eval.pages import markdown
 from rss_shield.eval.rollout import evaluate, run_episode
 from rss_shield.eval.stats import paired_difference
 from rss_shield.shield.lanes.pair import assess
@@ -171,11 +172,6 @@ def row(driver: str, shield: str, frame: pd.DataFrame) -> Row:
     )
 
 
-def markdown(rows: list[Any]) -> str:
-    lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
-    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines) + "\n"
-
-
 def of_road(env_id: str, config: Config) -> str:
     """The table of one road, and what anticipation did to the return."""
     rows, notes = [HEADINGS], []
@@ -193,7 +189,7 @@ def of_road(env_id: str, config: Config) -> str:
     if config.idm_episodes:
         rows.append(row("IDM", "monitor", play_idm(env_id, config.idm_episodes)))
     difference = f"Return after minus before, paired, with its 95 % interval: {'; '.join(notes)}.\n"
-    return f"## {env_id}\n\n{markdown(rows)}\n{difference}"
+    return f"## {env_id}\n\n{markdown(rows)}\n\n{difference}"
 
 
 # ---------------------------------------------------------------- between two lanes
@@ -290,7 +286,7 @@ change crosses 2 m there, and the published limits of lateral speed and heading 
 15 m/s do so in 1.3 s at best. Episodes above {LONG} s are therefore played again on highway-env, and in their longest
 stretches those frames are counted on which the shield did *not* hold the steering to such a limit, or the car did not
 get on toward the side on which it left: what is not a lane change at the limits."""
-    return f"## Between two lanes\n\n{text}\n\n{markdown(rows)}"
+    return f"## Between two lanes\n\n{text}\n\n{markdown(rows)}\n"
 
 
 # ---------------------------------------------------------------- what it costs
@@ -349,7 +345,7 @@ def price() -> str:
     )
     bare = f"{best['engine bare']:.2f} µs"
     text = f"The least of five runs in turn, always FASTER on highway-fast-v0. The engine without a shield: {bare}."
-    return f"## What it costs\n\n{text}\n\n{markdown(rows)}"
+    return f"## What it costs\n\n{text}\n\n{markdown(rows)}\n"
 
 
 # ---------------------------------------------------------------- behind one leader

@@ -23,48 +23,51 @@ class Metric(NamedTuple):
     statistic: Literal["rate", "mean", "median"]
     scale: float  # shown value = scale * value
     digits: int
+    less_is_better: bool
     limits: tuple[float, float] = (-math.inf, math.inf)  # what the value can be
 
 
+LESS, MORE = True, False  # is better
+
 # The success rate and the time of the episodes that succeed belong to environments with a goal only.
 METRICS = (
-    Metric("crash", "crash", "%", "rate", 100, 0, (0, 1)),
-    Metric("at_fault", "ego at fault", "%", "rate", 100, 0, (0, 1)),
-    Metric("other", "other at fault", "%", "rate", 100, 0, (0, 1)),
-    Metric("inherited", "inherited", "%", "rate", 100, 0, (0, 1)),
-    Metric("none", "none", "%", "rate", 100, 0, (0, 1)),
-    Metric("success", "success", "%", "rate", 100, 0, (0, 1)),
-    Metric("time_to_goal", "time to goal", "s", "mean", 1, 1, (0, math.inf)),
-    Metric("return", "return", "", "mean", 1, 1),
-    Metric("own_return", "own return", "", "mean", 1, 1),  # where there is a reward of one's own
-    Metric("speed", "speed", "m/s", "mean", 1, 1),
-    Metric("length", "length", "steps", "mean", 1, 1, (0, math.inf)),
-    Metric("override_share", "overridden", "%", "mean", 100, 0, (0, 1)),
-    Metric("anticipation_share", "anticipated", "%", "mean", 100, 0, (0, 1)),
-    Metric("mean_acceleration_change", "change", "m/s²", "mean", 1, 1, (0, math.inf)),
-    Metric("rms_jerk", "rms jerk", "m/s³", "mean", 1, 1, (0, math.inf)),
-    Metric("hard_braking_share", "hard braking", "%", "mean", 100, 0, (0, 1)),
-    Metric("comfortable_share", "comfortable", "%", "mean", 100, 0, (0, 1)),
-    Metric("min_time_gap", "min time gap", "s", "median", 1, 1, (0, math.inf)),
-    Metric("frozen", "frozen", "%", "rate", 100, 0, (0, 1)),
-    Metric("near_misses", "near misses", "", "mean", 1, 2, (0, math.inf)),
-    Metric("impact", "impact speed", "m/s", "mean", 1, 1, (0, math.inf)),
-    Metric("impact_delta_v", "DeltaV", "m/s", "mean", 1, 1, (0, math.inf)),
-    Metric("min_thw_ahead", "min THW ahead", "s", "median", 1, 1, (0, math.inf)),
-    Metric("max_drac_ahead", "max DRAC ahead", "m/s²", "median", 1, 1, (0, math.inf)),
-    Metric("min_pet", "min PET", "s", "median", 1, 1, (0, math.inf)),
-    Metric("violation_ego", "RSS violated by ego", "s", "mean", 1, 2, (0, math.inf)),
-    Metric("violation_other", "RSS violated by other", "s", "mean", 1, 2, (0, math.inf)),
-    Metric("shield_time", "shield per frame", "µs", "median", 1e6, 0, (0, math.inf)),
-    Metric("min_ttc", "min TTC", "s", "median", 1, 1, (0, math.inf)),
+    Metric("crash", "crash", "%", "rate", 100, 0, LESS, (0, 1)),
+    Metric("at_fault", "ego at fault", "%", "rate", 100, 0, LESS, (0, 1)),
+    Metric("other", "other at fault", "%", "rate", 100, 0, LESS, (0, 1)),
+    Metric("inherited", "inherited", "%", "rate", 100, 0, LESS, (0, 1)),
+    Metric("none", "none", "%", "rate", 100, 0, LESS, (0, 1)),
+    Metric("success", "success", "%", "rate", 100, 0, MORE, (0, 1)),
+    Metric("time_to_goal", "time to goal", "s", "mean", 1, 1, LESS, (0, math.inf)),
+    Metric("return", "return", "", "mean", 1, 1, MORE),
+    Metric("own_return", "own return", "", "mean", 1, 1, MORE),  # where there is a reward of one's own
+    Metric("speed", "speed", "m/s", "mean", 1, 1, MORE),
+    Metric("length", "length", "steps", "mean", 1, 1, MORE, (0, math.inf)),
+    Metric("override_share", "overridden", "%", "mean", 100, 0, LESS, (0, 1)),
+    Metric("anticipation_share", "anticipated", "%", "mean", 100, 0, LESS, (0, 1)),
+    Metric("mean_acceleration_change", "change", "m/s²", "mean", 1, 1, LESS, (0, math.inf)),
+    Metric("rms_jerk", "rms jerk", "m/s³", "mean", 1, 1, LESS, (0, math.inf)),
+    Metric("hard_braking_share", "hard braking", "%", "mean", 100, 0, LESS, (0, 1)),
+    Metric("comfortable_share", "comfortable", "%", "mean", 100, 0, MORE, (0, 1)),
+    Metric("min_time_gap", "min time gap", "s", "median", 1, 1, MORE, (0, math.inf)),
+    Metric("frozen", "frozen", "%", "rate", 100, 0, LESS, (0, 1)),
+    Metric("near_misses", "near misses", "", "mean", 1, 2, LESS, (0, math.inf)),
+    Metric("impact", "impact speed", "m/s", "mean", 1, 1, LESS, (0, math.inf)),
+    Metric("impact_delta_v", "DeltaV", "m/s", "mean", 1, 1, LESS, (0, math.inf)),
+    Metric("min_thw_ahead", "min THW ahead", "s", "median", 1, 1, MORE, (0, math.inf)),
+    Metric("max_drac_ahead", "max DRAC ahead", "m/s²", "median", 1, 1, LESS, (0, math.inf)),
+    Metric("min_pet", "min PET", "s", "median", 1, 1, MORE, (0, math.inf)),
+    Metric("violation_ego", "RSS violated by ego", "s", "mean", 1, 2, LESS, (0, math.inf)),
+    Metric("violation_other", "RSS violated by other", "s", "mean", 1, 2, LESS, (0, math.inf)),
+    Metric("shield_time", "shield per frame", "µs", "median", 1e6, 0, LESS, (0, math.inf)),
+    Metric("min_ttc", "min TTC", "s", "median", 1, 1, MORE, (0, math.inf)),
     # where risk is measured
-    Metric("min_thw", "min THW", "s", "median", 1, 1, (0, math.inf)),
-    Metric("max_drac", "max DRAC", "m/s²", "median", 1, 1, (0, math.inf)),
-    Metric("max_rdsi", "max RDSI", "", "median", 1, 2),
-    Metric("time_known_safe", "known safe", "s", "mean", 1, 1, (0, math.inf)),
-    Metric("time_unknown", "unknown", "s", "mean", 1, 1, (0, math.inf)),
-    Metric("time_known_unsafe", "known unsafe", "s", "mean", 1, 1, (0, math.inf)),
-    Metric("band_risk", "band risk", "s", "mean", 1, 1, (0, math.inf)),
+    Metric("min_thw", "min THW", "s", "median", 1, 1, MORE, (0, math.inf)),
+    Metric("max_drac", "max DRAC", "m/s²", "median", 1, 1, LESS, (0, math.inf)),
+    Metric("max_rdsi", "max RDSI", "", "median", 1, 2, LESS),
+    Metric("time_known_safe", "known safe", "s", "mean", 1, 1, MORE, (0, math.inf)),
+    Metric("time_unknown", "unknown", "s", "mean", 1, 1, LESS, (0, math.inf)),
+    Metric("time_known_unsafe", "known unsafe", "s", "mean", 1, 1, LESS, (0, math.inf)),
+    Metric("band_risk", "band risk", "s", "mean", 1, 1, LESS, (0, math.inf)),
 )
 
 

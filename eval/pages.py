@@ -6,7 +6,7 @@ docs/results/ppo.md; without names, all below runs/.
 
 import argparse
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +16,9 @@ from rss_shield.eval import arms
 from rss_shield.eval.files import write_text
 from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.replay import verdict
-from rss_shield.eval.table import legend, table_frame
+from rss_shield.eval.table import legend, markdown, table_frame
 
-
-def markdown(rows: Iterable[Sequence[Any]]) -> str:
-    """A Markdown table; the first row is its heading."""
-    heading, *body = [[_cell(value) for value in row] for row in rows]
-    lines = [heading, ["---"] * len(heading), *body]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _cell(value: Any) -> str:
-    return str(value).replace("|", "\\|").replace("\n", " ")
+__all__ = ["fill", "markdown", "spaced", "write_page"]  # what pages are written with
 
 
 def spaced(number: int) -> str:

@@ -27,7 +27,6 @@ COLUMNS = (
     "at_fault",  # ... with the ego at fault
     "return",  # mean of the raw rewards' sum
     "return_sd",  # standard deviation over the episodes
-    "intervention",  # mean share of frames that a proper response overrode
     "change",  # mean change of acceleration [m/s^2]
 )
 
@@ -67,13 +66,12 @@ def row_of(timesteps: int, test: str, episodes: pd.DataFrame) -> dict[str, objec
         "at_fault": float(episodes["at_fault"].mean()),
         "return": float(returns.mean()),
         "return_sd": float(returns.std(ddof=1)) if len(returns) > 1 else 0.0,
-        "intervention": float(episodes["override_share"].mean()),
         "change": float(episodes["mean_acceleration_change"].mean()),
     }
 
 
 def plot_removal(rows: pd.DataFrame, folder: Path, title: str) -> None:
-    """Crashes and return without the shield, and how often it intervenes when it is there, over training.
+    """Crashes and return without the shield, and how much it changes when it is there, over training.
 
     Args:
       rows: COLUMNS, and arm, train_seed.

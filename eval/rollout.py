@@ -105,9 +105,9 @@ def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
     reached its goal untouched (no such column where there is no goal); cost: sum; override_share: of
     the simulation frames; dangerous_pairs, broken_duties: pair-frames in danger, and those on which the
     car broke its duty; min_ttc: smallest time to collision [s]; what was changed and how the ride felt: the keys
-    `RIDE`, and with the option `risk` the keys `RISK`, as `envs.ShieldWrapper` documents them (max_drac at most
-    `MOST_DRAC`); with the option `measures` what it adds, and frozen: the time was up and the ego had stood for 5 s or
-    more with nobody within 20 m; evidence: the verdict's grounds as JSON, {} without contact.
+    `RIDE`, and with the option `risk` the keys `RISK`, as `envs.highway.wrapper.ShieldWrapper` documents them
+    (max_drac at most `MOST_DRAC`); with the option `measures` what it adds, and frozen: the time was up and the ego had
+    stood for 5 s or more with nobody within 20 m; evidence: the verdict's grounds as JSON, {} without contact.
     """
     env = make_env()
     try:

@@ -1,7 +1,9 @@
 """The comparison as one table: in the terminal, as plain text, Markdown, LaTeX and CSV."""
 
 import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -79,8 +81,12 @@ def write_table(summary: pd.DataFrame, folder: Path, title: str, note: str = "")
     frame = table_frame(summary)
     with atomic(folder / "table.txt") as temporary, open(temporary, "w", encoding="utf-8") as stream:
         print_table(summary, title, Console(file=stream, width=160), note)
+    text = markdown([frame.columns, *frame.itertuples(index=False)])
     below = f"\n\n{note}" if note else ""
-    write_text(folder / "table.md", f"{title}\n\n{_markdown(frame)}\n\n{legend(summary)}{below}\n")
+    write_text(
+        folder / "table.md",
+        f"{title}\n\n{text}\n\n{legend(summary)}{below}\n",
+    )
     write_text(folder / "table.tex", _latex(frame))
     with atomic(folder / "table.csv") as temporary:
         summary.to_csv(temporary, index=False)
@@ -131,9 +137,15 @@ def _broken(text: str) -> str:
     return text.replace(" [", "\n\\[").replace(" (", "\n(")
 
 
-def _markdown(frame: pd.DataFrame) -> str:
-    lines = [frame.columns, ["---"] * len(frame.columns), *frame.itertuples(index=False)]
+def markdown(rows: Iterable[Sequence[Any]]) -> str:
+    """A Markdown table; the first row is its heading."""
+    heading, *body = [[_cell(value) for value in row] for row in rows]
+    lines = [heading, ["---"] * len(heading), *body]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _cell(value: Any) -> str:
+    return str(value).replace("|", "\\|").replace("\n", " ")
 
 
 def _latex(frame: pd.DataFrame) -> str:

@@ -25,7 +25,7 @@ from rss_shield.agents.load import algorithm_in, policy_of
 from rss_shield.command_line import NO_OVERRIDES, ConfigFile, Overrides, fail, parsed, shown
 from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.envs.make_vec import BACKENDS
-from rss_shield.envs.options import WAITING, default_preset
+from rss_shield.envs.options import WAITING
 from rss_shield.eval.arms import CONTINUOUS, OFF_AND_ON
 from rss_shield.eval.config_option import split_arguments, with_values
 from rss_shield.eval.files import atomic, write_json
@@ -34,7 +34,7 @@ from rss_shield.eval.own import digests, driver_named, is_own
 from rss_shield.eval.progress import move_to, progress_bar
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import versions
-from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
+from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in, usual_preset
 from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.eval.table import print_table, write_table
 from rss_shield.shield.junctions.memory import ENTRIES
@@ -191,9 +191,7 @@ def preset_of(config: Config, card: Mapping[str, Any]) -> Preset | None:
     if not (config.ego.given or config.other.given):
         return preset
     if preset is None:
-        env = rss_shield.make(config.env_id, shield=None)
-        env.close()
-        preset = PRESETS[default_preset(env.unwrapped)]
+        preset = PRESETS[usual_preset(config.env_id)]
     try:
         return with_parameters(preset, config.ego.given, config.other.given)
     except ValueError as error:

@@ -376,7 +376,7 @@ class Engine:
     Args:
       scenario: what to run.
       num_envs: E.
-      settings: `envs.highway.ego.Settings` of the shield, None = no shield.
+      settings: `envs.options.Settings` of the shield, None = no shield.
       penalty: subtracted from the reward, times the share of frames that the shield overrode.
       autoreset: DISABLED, SAME_STEP or NEXT_STEP.
       threads: how many threads share the work.

@@ -154,7 +154,7 @@ def watch_frame(cars, episode, net, sight, distances, plans, ride, meter, watch,
       ride: RIDE.
       meter: of risk; None = nobody asked.
       watch: `Watch`.
-      settings: `envs.highway.ego.Settings`.
+      settings: `envs.options.Settings`.
       step: STEP, the tally is kept there.
       aware: `Aware`; None = the ego sees what is there.
     """

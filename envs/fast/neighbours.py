@@ -139,7 +139,7 @@ def measure(cars, episode, lanes, sight, distances, boxes, settings, chosen, nea
       cars, episode, lanes, sight: of the environment.
       distances: `Distances`.
       boxes: as in `Watch`.
-      settings: `envs.highway.ego.Settings`.
+      settings: `envs.options.Settings`.
       chosen: those who matter are in `past.near` already, the first `episode.near`.
       nearest, soonest: as in `shield.lanes.controller.find_danger`.
       within: whose margin is less than this matters, too [m].

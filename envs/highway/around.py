@@ -11,8 +11,8 @@ def around(shield: ShieldedEgo) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The nearest in each of SIDES on the last frame, where distances along lanes keep an ego safe.
 
     Returns:
-      `[4]` gap and required gap, bumper to bumper [m], NaN where nobody is; `[4]` index among `shield.others`, -1 =
-      nobody.
+      `[4]` gap and required gap, bumper to bumper [m], NaN where nobody is; `[4]` index among the shield's `others`,
+      -1 = nobody.
     """
     ego, users = shield.last
     gap, required, nearest = np.full(4, np.nan), np.full(4, np.nan), np.full(4, -1)

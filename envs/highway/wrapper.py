@@ -72,8 +72,8 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
       env: a highway-env environment with one controlled vehicle; see `SUPPORTED`.
       mode: "override" or "monitor".
       params: name of a preset, `Preset`, a pair of `RSSParams` (ego, other), a dict of RSS parameters that both have,
-        a dict of two such dicts ("ego", "other"), or None: "intersection" at intersections, "simulator" elsewhere.
-        What a dict leaves out is that of None.
+        a dict of two such dicts ("ego", "other"), or None: "intersection" at intersections, "parking" on car parks,
+        "simulator" elsewhere. What a dict leaves out is that of None.
       intervention_penalty: subtracted from the reward, times what `penalty_on` names.
       penalty_on: "response", the step's `override_fraction` (the penalty is per decision that is overridden on all
         frames), or "change", its `mean_acceleration_change` (the penalty is per m/s^2).

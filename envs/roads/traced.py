@@ -25,7 +25,7 @@ def lane_id(index: LaneIndex) -> str:
 
 
 def configuration(network: Any) -> list[list[Any]]:
-    """All lanes as JSON, from which `network_from` builds the same network: start, end, lanes of each road."""
+    """All lanes as JSON, from which the same network can be built again: start, end, lanes of each road."""
     return [
         [start, end, [lane.to_config() for lane in lanes]]
         for start, ends in network.graph.items()

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -100,7 +100,7 @@ def experiment_of(given: Mapping[str, Any]) -> Experiment:
     for seed in seeds:
         _whole("seeds", seed, 0)
     texts = {name: tuple(map(str, _list(given, name, []))) for name in ("environments", "arms", "policies")}
-    for name, values in texts.items():
+    for name, values in {"seeds": seeds, **texts}.items():
         if len(set(values)) < len(values):
             raise ValueError(f"{name} = {list(values)}: something is named twice")
     return Experiment(
@@ -225,6 +225,3 @@ def _whole(name: str, value: Any, least: int) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or value < least:
         raise ValueError(f"{name} = {value!r}: expected a whole number >= {least}")
     return value
-
-
-KEYS = tuple(option.name for option in fields(Experiment))

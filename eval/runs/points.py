@@ -15,22 +15,6 @@ from rss_shield.eval.stats import (
     pareto_front,
 )
 
-LESS_IS_BETTER = frozenset(
-    [
-        *("crash", "at_fault", "other", "inherited", "none", "time_to_goal", "override_share", "anticipation_share"),
-        *(
-            "mean_acceleration_change",
-            "rms_jerk",
-            "hard_braking_share",
-            "frozen",
-            "near_misses",
-            "impact",
-            "max_drac_ahead",
-        ),
-        *("violation_ego", "violation_other", "shield_time"),
-    ]
-)
-
 
 def metric_named(name: str) -> Metric:
     """A metric of the tables.
@@ -96,7 +80,8 @@ def with_front(wide: pd.DataFrame, safety: str, performance: str) -> pd.DataFram
     Args:
       wide: a row per point; columns of the metrics' values.
     """
-    costs = np.column_stack([wide[name] * (1.0 if name in LESS_IS_BETTER else -1.0) for name in (safety, performance)])
+    metrics = (metric_named(name) for name in (safety, performance))
+    costs = np.column_stack([wide[metric.name] * (1.0 if metric.less_is_better else -1.0) for metric in metrics])
     front = np.zeros(len(wide), bool)
     for _, rows in groups_of(wide):
         front[rows] = pareto_front(costs[rows])

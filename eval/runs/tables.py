@@ -14,7 +14,7 @@ from rss_shield.eval.files import atomic, write_text
 from rss_shield.eval.metrics import Metric
 from rss_shield.eval.plots import STYLE
 from rss_shield.eval.runs.points import APART, groups_of, metric_named, with_front
-from rss_shield.eval.table import rounded
+from rss_shield.eval.table import markdown, rounded
 
 SHOWN = ("crash", "at_fault", "success", "return", "own_return", "speed", "override_share", "rms_jerk", "min_ttc")
 FRONT, BEATEN = "#0072B2", "#999999"
@@ -66,8 +66,7 @@ def _plain(value: Any) -> str:
 
 
 def markdown_of(frame: pd.DataFrame) -> str:
-    lines = [list(frame.columns), ["---"] * len(frame.columns), *frame.to_numpy().tolist()]
-    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
+    return markdown([list(frame.columns), *frame.to_numpy().tolist()])
 
 
 def write_points(folder: Path, points: pd.DataFrame, axes: list[str], safety: str, performance: str, title: str) -> str:
@@ -100,11 +99,11 @@ def plot_front(table: pd.DataFrame, axes: list[str], safety: str, performance: s
     rows = -(-len(groups) // columns)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.8, 0.8 + 3.4 * rows))
-        panels = figure.subplots(rows, columns, squeeze=False).flat
-        for plot, (label, numbers) in zip(panels, groups, strict=False):
+        panels = iter(figure.subplots(rows, columns, squeeze=False).flat)
+        for (label, numbers), plot in zip(groups, panels, strict=False):  # groups first: a panel drawn is a panel used
             _panel(plot, table.iloc[numbers], [name for name in axes if name not in APART], safety, performance)
             plot.set_title(label, loc="left")
-        for plot in list(panels):
+        for plot in panels:
             plot.set_axis_off()
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
@@ -130,7 +129,7 @@ def _panel(plot: Axes, table: pd.DataFrame, axes: list[str], safety: str, perfor
     plot.set_ylabel(f"{y.label} [{y.unit}]" if y.unit else y.label)
 
 
-NEAR = 0.04  # of what a panel shows: labels that are nearer than this in both directions would cover each other
+NEAR = 0.04  # of the front's extent: points that are nearer than this in both directions share a label
 
 
 def labels_of(front: pd.DataFrame, axes: list[str], x: Metric, y: Metric) -> list[tuple[tuple[float, float], str]]:

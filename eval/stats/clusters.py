@@ -25,8 +25,10 @@ def cluster_bootstrap(
     A resample draws S seeds, then of each drawn one as many episodes as it has (Davison & Hinkley 1997, sec. 3.8). They
     give the standard error, times sqrt(S / (S - 1)) for what drawing from S seeds lacks; the interval is Student's t
     with S - 1 degrees of freedom around the value. Percentiles of the resamples would be far too narrow for the three
-    to ten seeds of a training campaign. Seeds that agree as well as their episodes permit get an interval that is up to
-    sqrt(2) times too wide, never one without width.
+    to ten seeds of a training campaign. The factor multiplies what the episodes scatter within a seed, too, which needs
+    no correction: where seeds agree as well as their episodes permit, the variance is 1 + S / (S - 1) times too large,
+    so the interval is sqrt(3) times too wide for two seeds, 1.58 times for three and sqrt(2) times for many; never one
+    without width.
 
     Args:
       seeds: S samples, `[K_s]` episodes each.

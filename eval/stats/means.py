@@ -24,8 +24,11 @@ def bootstrap_mean(sample: ArrayLike, rng: np.random.Generator, confidence: floa
 
     A sample whose values are all equal gets an interval of no width: the bootstrap knows only what it
     has seen.
+
+    Raises:
+      ValueError: a value is not known.
     """
-    values = np.asarray(sample, float)
+    values = _known(sample)
     if values.size > MANY and np.ptp(values) > 0.0:
         low, high = stats.norm.interval(confidence, values.mean(), stats.sem(values))
         return Interval(float(values.mean()), float(low), float(high), values.size)
@@ -33,8 +36,8 @@ def bootstrap_mean(sample: ArrayLike, rng: np.random.Generator, confidence: floa
 
 
 def bootstrap_median(sample: ArrayLike, rng: np.random.Generator, confidence: float = 0.95) -> Interval:
-    """Median with the percentile bootstrap interval, which suits capped samples. sample: [n]."""
-    return _bootstrap(np.asarray(sample, float), np.median, "percentile", rng, confidence)
+    """Median with the percentile bootstrap interval, which suits capped samples. sample: [n], all of them known."""
+    return _bootstrap(_known(sample), np.median, "percentile", rng, confidence)
 
 
 def paired_difference(
@@ -64,6 +67,15 @@ def student(sample: ArrayLike, confidence: float = 0.95) -> Interval:
     return Interval(mean, float(bounds.low), float(bounds.high), n)
 
 
+def _known(sample: ArrayLike) -> np.ndarray:
+    """`[n]` numbers, infinite ones among them: a minimum over nothing is infinite, but has been measured."""
+    values = np.asarray(sample, float)
+    unknown = np.flatnonzero(np.isnan(values))
+    if unknown.size:
+        raise ValueError(f"sample[{unknown[0]}] = nan: expected numbers; leave out what is not known")
+    return values
+
+
 def _bootstrap(sample: np.ndarray, statistic, method: str, rng: np.random.Generator, confidence: float) -> Interval:
     n = sample.size
     if n == 0:
@@ -85,6 +97,6 @@ def _bootstrap(sample: np.ndarray, statistic, method: str, rng: np.random.Genera
             method=method,
             rng=rng,
         ).confidence_interval
-    if np.isnan(bounds.low) or np.isnan(bounds.high):  # BCa fails on some near-constant samples
+    if method == "BCa" and (np.isnan(bounds.low) or np.isnan(bounds.high)):  # BCa fails on some near-constant samples
         return _bootstrap(sample, statistic, "percentile", rng, confidence)
     return Interval(value, float(bounds.low), float(bounds.high), n)

@@ -10,7 +10,7 @@ POLICIES = ("random", "faster", "slower", "switching", "greedy")  # of meta-acti
 FREE = ("bang-bang", "wild")  # steering and acceleration
 CONTINUOUS = {"action": {"type": "ContinuousAction"}}
 STEERED = ("highway-v0", "highway-fast-v0", "exit-v0", "exit-v1")  # where the engine has these
-_KEPT_FOR = 0.2  # chance per decision that a switching policy takes another action
+_CHANGES = 0.2  # chance per decision that a switching policy takes another action
 
 Act = Callable[[np.ndarray], np.ndarray]
 
@@ -72,7 +72,7 @@ def _held(rng: np.random.Generator, draw: Callable[[int], np.ndarray]) -> Act:
     def act(seen: np.ndarray) -> np.ndarray:
         drawn = draw(len(seen))
         kept = last.get(len(seen), drawn)
-        changes = rng.random(len(seen)) < _KEPT_FOR
+        changes = rng.random(len(seen)) < _CHANGES
         last[len(seen)] = np.where(changes.reshape(-1, *[1] * (drawn.ndim - 1)), drawn, kept)
         return last[len(seen)]
 

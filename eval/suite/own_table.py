@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from rss_shield.envs.make import make
+from rss_shield.envs.options import default_preset
 from rss_shield.eval.config_option import FILES, read_config
 from rss_shield.eval.runs.names import check_names
 from rss_shield.shield.params import PRESETS, Preset, RSSParams, with_parameters
@@ -35,6 +37,13 @@ def preset_in(name: str) -> Preset:
         return _preset_of(given, name)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
+
+
+def usual_preset(environment: str) -> str:
+    """Name of the preset that suits an environment, by its id."""
+    env = make(environment, shield=None)
+    env.close()
+    return default_preset(env.unwrapped)
 
 
 def _preset_of(given: dict[str, Any], name: str) -> Preset:

@@ -12,7 +12,7 @@ from rss_shield.envs.options import MODES, Options
 from rss_shield.eval.config_option import read_config
 from rss_shield.eval.own import function_named
 from rss_shield.eval.runs.names import check_names, nested
-from rss_shield.eval.suite.own_table import preset_in
+from rss_shield.eval.suite.own_table import preset_in, usual_preset
 from rss_shield.shield.params import Preset, RSSParams, Rules, with_parameters
 
 OTHERS = {"reckless": RECKLESS, **HOSTILE}  # who else is on the road, by name
@@ -22,7 +22,6 @@ _SHIELD = (
 )
 _TABLE = ("preset", "ego", "other")
 KNOWN = ("shield", "backend", "others", "config", "rules", "judge", "reward", *_TABLE, *_SHIELD)
-DEFAULT_PRESET = "simulator"
 
 
 def setup_of(environment: str, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,9 +85,8 @@ def _table(environment: str, given: Mapping[str, Any], prefix: str) -> Preset | 
     asked = {side: given.get(side, {}) for side in ("ego", "other")}
     if "preset" not in given and not any(asked.values()) and not prefix:
         return None
-    name = given.get("preset", "intersection" if "intersection" in environment else DEFAULT_PRESET)
     try:
-        preset = preset_in(name)
+        preset = preset_in(given["preset"] if "preset" in given else usual_preset(environment))
     except ValueError as error:
         raise ValueError(f"{prefix}{error}") from None
     for side, values in asked.items():

@@ -138,13 +138,13 @@ class Occupancy(NamedTuple):
 
     mover: Mover
     bounds: Bounds
-    braking: np.ndarray  # `[K, 9]` C_b: accelerates as it likes, then brakes
-    going_on: np.ndarray  # `[K, 9]` C_f: accelerates as it likes all along
+    braking: np.ndarray  # `[K, 10]` C_b: accelerates as it likes, then brakes
+    going_on: np.ndarray  # `[K, 10]` C_f: accelerates as it likes all along
 
 
 @compiled
 def occupy(mover, driver, steering, dt, braking, going_on):
-    """Fill the arrays of an `Occupancy`, `[K, 9]` each, K <= MAX_STEPS, in steps of `dt` [s]; returns its `Bounds`."""
+    """Fill the arrays of an `Occupancy`, `[K, 10]` each, K <= MAX_STEPS, in steps of `dt` [s]; returns its `Bounds`."""
     rho, a, b, v_cap = driver.response_time, driver.a_max_accel, driver.a_min_brake, driver.v_cap
     _fill(braking, mover, driver, steering, dt, True)
     _fill(going_on, mover, driver, steering, dt, False)

@@ -253,7 +253,7 @@ def judge_contact(ego, user, memory, table):
     Args:
       ego, user: `ROAD_USER` records at the sample at which contact exists or is predicted for the
         next frame, before any impact displaces the cars.
-      memory: `MEMORY` record after the previous sample, nothing skipped (`response.catch_up`).
+      memory: `MEMORY` record after the previous sample, nothing skipped (`shield.lanes.memory.catch_up`).
 
     Returns:
       `Verdict`. "inherited": never safe since first sight and the ego responded properly all the

@@ -7,12 +7,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from places import ROOT
 
+from rss_shield import make
 from rss_shield.cli import main
+from rss_shield.envs.options import default_preset
 from rss_shield.eval.runs.experiment import Range, experiment_of, read_experiment
 from rss_shield.eval.runs.names import flat, nested
 from rss_shield.eval.runs.store import Store
 from rss_shield.eval.runs.tasks import Task, key_of, samples_of, tasks_of
+from rss_shield.eval.suite.setup import setup_of
 from rss_shield.eval.suite.sweep import check_tasks
+from rss_shield.shield.params import PRESETS
 
 LEAST = {"name": "x", "policies": ["faster"]}
 
@@ -36,6 +40,15 @@ def test_every_combination_is_a_task():
     assert tasks[-1].config["options"] == {"shield": "monitor", "rules.anticipation": 2}
 
 
+@pytest.mark.parametrize("environment", ["highway-fast-v0", "intersection-v0", "parking-parked-v0"])
+def test_single_parameters_change_the_table_that_suits_the_environment(environment):
+    env = make(environment, shield=None)
+    env.close()
+    usual = PRESETS[default_preset(env.unwrapped)]
+    changed = setup_of(environment, {"ego.mu": usual.ego.mu + 0.01})["params"]
+    assert (changed.other, changed.ego.v_cap) == (usual.other, usual.ego.v_cap)
+
+
 def test_the_key_is_that_of_the_configuration_however_it_is_written():
     assert key_of({"a": 1, "b": {"c": (1, 2), "d": 0.1}}) == key_of({"b": {"d": 0.1, "c": [1, 2]}, "a": 1})
     assert key_of({"a": 1}) != key_of({"a": 1.5})
@@ -52,6 +65,7 @@ def test_the_key_is_that_of_the_configuration_however_it_is_written():
         ({"arms": ["shielded"]}, "either arms"),
         ({"policies": []}, "either arms"),
         ({"seeds": [0, "1"]}, "seeds = '1': expected a whole number >= 0"),
+        ({"seeds": [0, 0]}, "seeds = [0, 0]: something is named twice"),
         ({"environments": "merge-v0"}, "environments = 'merge-v0': expected a list"),
         ({"policies": ["faster", "faster"]}, "something is named twice"),
         ({"sweep": {"grid": {"rules.memory": True}}}, "sweep.grid.rules.memory = True: expected a list of values"),

@@ -10,8 +10,9 @@ from rss_shield import make
 from rss_shield.cli import main
 from rss_shield.envs.highway.hostile import HOSTILE
 from rss_shield.envs.highway.recorder import Film, record_trace
-from rss_shield.eval.suite.judge.judgement import judge_trace
+from rss_shield.eval.suite.judge.judgement import _joined, judge_trace
 from rss_shield.eval.suite.judge.lanes import see_all, table_of
+from rss_shield.eval.suite.judge.smoothing import filled_in
 from rss_shield.shield.params import PRESETS
 from rss_shield.shield.trace import Trace, save, straight_lane, users_of
 from rss_shield.shield.verdicts import DUTIES
@@ -279,6 +280,28 @@ def test_a_verdict_from_positions_alone_says_how_sure_it_is():
     noisy = replace(slow.users, x=slow.users.x + rng.normal(0.0, 0.1, slow.users.x.shape))
     unsure = [one for one in judge_trace(slow.replaced(users=noisy), HAND).dangers if one.user == 0]
     assert unsure and not any(one.is_sure for one in unsure if 0.0 < one.excess < 0.5)
+
+
+def test_stretches_too_short_for_a_whole_fit_say_nothing_of_the_noise():
+    """A fit through six of ten samples leaves less of the noise than one through eleven."""
+    rng = np.random.default_rng(6)
+    trace = following(50.0, [], [], commands=False)
+    x = trace.users.x + rng.normal(0.0, 0.1, trace.users.x.shape) * [0.0, 1.0]
+    x[10::11, 1] = np.nan  # the front car is seen for ten samples at a time, the rear one all along
+    _, noise = filled_in(trace.replaced(users=replace(trace.users, x=x)))
+    assert noise.position < 0.01  # that of the rear car, which is exact
+
+
+def test_a_contact_is_sure_however_doubtful_another_is():
+    trace = following(50.0, [], [])
+    seen = {pair: view_of("inherited") for pair in ((0, 1), (1, 0))} | {(2, 3): view_of("ego", DUTIES[1])}
+    sure = seen | {(2, 3): view_of("inherited")}
+    certain, doubtful = _joined(trace, seen, sure)
+    assert certain.is_sure and not doubtful.is_sure
+
+
+def view_of(verdict, duty=""):
+    return {"frame": 3, "verdict": verdict, "ego_duty": duty, "other_duty": ""}
 
 
 # ---------------------------------------------------------------- the command

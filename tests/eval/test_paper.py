@@ -55,7 +55,7 @@ def folder(tmp_path):
             pd.DataFrame(curve).to_csv(path / f"{arm}-seed{seed}" / "learning_curve.csv", index=False)
             rows = [
                 {"timesteps": t, "test": test, "n": 20, "crash": 0.5, "at_fault": 0.5, "return": 10.0, "return_sd": 2.0}
-                | {"intervention": 0.1, "change": 1.0}
+                | {"change": 1.0}
                 for t in (500, 1000)
                 for test in ("off", "on")
             ]

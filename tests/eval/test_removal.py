@@ -41,7 +41,7 @@ def test_rows_are_added_and_read_back(tmp_path):
     # two contacts of five, one of them the ego's; returns 0 to 4
     assert [first[name] for name in ("n", "crash", "at_fault", "return")] == [5, 0.4, 0.2, 2.0]
     assert first["return_sd"] == pytest.approx(np.sqrt(2.5))
-    assert [first["intervention"], first["change"]] == [0.25, 1.5]
+    assert first["change"] == 1.5
 
 
 def test_seeds_are_pooled():

@@ -137,6 +137,13 @@ def test_one_different_value_still_gets_an_interval(n):
     assert interval.low <= interval.value <= interval.high
 
 
+@pytest.mark.parametrize("bootstrap", [bootstrap_mean, bootstrap_median])
+@pytest.mark.parametrize("sample", [[1.0, math.nan, 2.0], [math.nan], [math.nan] * (MANY + 1)])
+def test_what_is_not_known_is_refused(bootstrap, sample):
+    with pytest.raises(ValueError, match="= nan: expected numbers"):
+        bootstrap(sample, np.random.default_rng(0))
+
+
 def test_pairing_removes_what_both_samples_share():
     shared = np.random.default_rng(0).normal(0, 100, size=50)
     interval = paired_difference(shared + 1, shared, np.random.default_rng(0))

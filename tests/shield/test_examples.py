@@ -82,8 +82,8 @@ NOT_COMPUTED = {
     ("lemma4", "def6_literal"): "the word-for-word reading of Def. 6 is unsound and not offered",
     ("def6_literal_counterexample", "literal_minus_mu"): "the same",
     ("long_safe_predicate", "naive"): "the naive predicate calls overlapping cars safe and is not offered",
-    ("euler_stop", "euler"): "a drive, not a function: tests/test_euler_margin.py",
-    ("euler_stop", "rest"): "a drive, not a function: tests/test_euler_margin.py",
+    ("euler_stop", "euler"): "a drive, not a function: tests/shield/test_euler_margin.py",
+    ("euler_stop", "rest"): "a drive, not a function: tests/shield/test_euler_margin.py",
 }
 
 # rho 1 s, acceleration 3.5, braking 4 to 8, in its own lane 3 m/s^2; lateral 0.2 and 0.8 m/s^2, mu 0.1 m

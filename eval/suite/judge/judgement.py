@@ -37,9 +37,7 @@ class Blame(NamedTuple):
     time: float  # [s]
     users: tuple[int, int]
     at_fault: tuple[int, ...]  # users who broke a duty; empty = see `verdict`
-    verdict: (
-        str  # "first", "second", "both", "inherited", "other" (who broke none was hit by who can't be judged), "none"
-    )
+    verdict: str  # "first", "second", "both", "inherited", "none"
     views: dict[int, dict[str, Any]]  # by user: what its own view says, as a shield's `blame_evidence`
     is_sure: bool
 
@@ -167,10 +165,11 @@ def _joined(trace: Trace, seen: Views, sure: Views) -> tuple[Blame, ...]:
     """The two views of every contact as one; what is surely broken counts, or else what seems to be."""
     blames = []
     for i, j in sorted({(min(pair), max(pair)) for pair in seen}):
-        is_sure = seen == sure or bool(_at_fault(sure, i, j))
+        both = ((i, j), (j, i))
+        is_sure = [seen.get(pair) for pair in both] == [sure.get(pair) for pair in both] or bool(_at_fault(sure, i, j))
         views = sure if is_sure else seen
         at_fault = _at_fault(views, i, j)
-        sides = {a: views[a, b] for a, b in ((i, j), (j, i)) if (a, b) in views}
+        sides = {a: views[a, b] for a, b in both if (a, b) in views}
         if len(at_fault) == 2:
             verdict = "both"
         elif at_fault:

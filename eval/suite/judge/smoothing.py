@@ -41,8 +41,12 @@ def sigma_of(duty: int, noise: Noise) -> float:
 
 def window_of(dt: float, samples: int) -> int:
     """Samples of a fit: odd, more than the order, and no more than there are."""
-    wanted = max(round(WINDOW / dt) | 1, ORDER + 2 | 1)
-    return min(wanted, samples if samples % 2 else samples - 1)
+    return min(full_window(dt), samples if samples % 2 else samples - 1)
+
+
+def full_window(dt: float) -> int:
+    """Samples of a fit where there are enough."""
+    return max(round(WINDOW / dt) | 1, ORDER + 2 | 1)
 
 
 def derivative(values: np.ndarray, dt: float, order: int) -> np.ndarray:
@@ -74,7 +78,7 @@ def filled_in(trace: Trace) -> tuple[Trace, Noise]:
             forward[:-1] = np.maximum(forward[:-1], (np.minimum(v[1:], 0.0) - v[:-1]) / trace.dt)
             mine = unknown[start:end, i]
             acceleration[start:end, i][mine] = forward[mine]
-            if end - start > window_of(trace.dt, end - start) > ORDER:
+            if end - start > full_window(trace.dt):  # what a shorter fit leaves over is another share of the noise
                 dx, dy = x - derivative(x, trace.dt, 0), y - derivative(y, trace.dt, 0)
                 along.append(dx * cos + dy * sin)
                 across.append(dy * cos - dx * sin)
@@ -87,7 +91,7 @@ def noise_of(left: list[np.ndarray], dt: float) -> Noise:
     """Standard deviations by what a fit has left over of positions."""
     if not left:
         return EXACT
-    window = window_of(dt, 10**6)
+    window = full_window(dt)
     share = 1.0 - savgol_coeffs(window, ORDER)[window // 2]  # of the noise's variance that a fit leaves
     sigma = float(np.sqrt(np.mean(np.concatenate(left) ** 2) / share))
     speed, acceleration = (

@@ -1,0 +1,32 @@
+"""Points of an experiment: which metrics are better small, and what a figure shows of them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rss_shield.eval.metrics import METRICS
+from rss_shield.eval.runs.points import with_front
+from rss_shield.eval.runs.tables import plot_front
+
+MEASURED = ("max_rdsi", "max_drac", "band_risk", "time_known_unsafe", "time_unknown", "impact_delta_v")
+
+
+@pytest.mark.parametrize("safety", ["at_fault", "max_drac_ahead", *MEASURED])
+def test_of_two_equally_good_agents_the_one_in_less_danger_is_on_the_front(safety):
+    front = with_front(pd.DataFrame({safety: [1.0, 2.0], "return": [5.0, 5.0]}), safety, "return")
+    assert front["front"].tolist() == [True, False]
+
+
+def test_what_is_called_a_largest_value_is_better_small_and_a_smallest_one_better_large():
+    for metric in METRICS:
+        if metric.name.startswith(("max_", "min_")):
+            assert metric.less_is_better == metric.name.startswith("max_")
+
+
+@pytest.mark.parametrize("groups", [1, 2, 3, 4, 5])
+def test_a_panel_without_points_is_not_drawn(groups):
+    names = [f"environment {k}" for k in range(groups)]
+    columns = {f"{name}{end}": np.ones(groups) for name in ("at_fault", "return") for end in ("", "_low", "_high")}
+    table = with_front(pd.DataFrame({"environment": names, **columns}), "at_fault", "return")
+    figure = plot_front(table, ["environment"], "at_fault", "return", "title")
+    assert sum(axes.axison for axes in figure.axes) == groups
