@@ -15,6 +15,8 @@ LEFT_NO_PLAN, WAVERED, ACCELERATED, BRAKED, LEFT_PATHS, CRASHED, GAVE_NO_WAY, RE
 LEAPED, WALKED_IN, HURRIED, LEFT_CROSSING, UNREASONABLE, NO_CAUTION = range(17, 23)
 # in open space, where some of the above are owed, too
 STEERED = 23
+# of whoever is not a car as cars are, where roads cross and in open space
+JUMPED = 24
 DUTIES = (
     "",
     "got farther along the lane than its share [m]",
@@ -40,6 +42,7 @@ DUTIES = (
     "came out of hiding faster than is reasonable [m/s]",
     "drove too fast for who was hidden",
     "turned while it had to brake [rad]",
+    "moved or turned farther than its speed explains [m]",
 )
 NOBODY, EGO, OTHER, BOTH, INHERITED = range(5)
 VERDICTS = ("none", "ego", "other", "both", "inherited")

@@ -178,7 +178,7 @@ class JunctionEgo(ShieldedEgo):
             car["size"], car["on"] = size, junction.number[v.lane_index]
             car["lane"] = car["choice"] = -1
             heads_for, route = self._declared(v)
-            if heads_for is not None:
+            if heads_for in junction.number:
                 car["lane"], car["choice"] = junction.number[heads_for], junction.choice(heads_for, route)
         return cars
 

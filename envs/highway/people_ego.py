@@ -86,6 +86,7 @@ class PeopleEgo(JunctionEgo):
         road, paths = self.vehicle.road, roads.paths
         for i in self.people:  # bounds of cars are none of theirs
             sample = self.samples[i]
+            sample["x"] = sample["y"] = sample["heading"] = 0.0
             sample["speed"], sample["lanes"], sample["alert"] = 0.0, 0, True
             sample["wreck"] = sample["astray"] = sample["strays"] = False
         start = float(self.cars[-1]["x"]) - track.s

@@ -380,7 +380,8 @@ def list_threats(roads, track, cars, memory, intent, v_cap, samples, threats, bo
     count = 0
     for i in range(len(cars)):
         car = cars[i]
-        samples[i].x, samples[i].y, samples[i].speed = car.x, car.y, car.speed
+        samples[i].x, samples[i].y, samples[i].heading, samples[i].speed = car.x, car.y, car.heading, car.speed
+        samples[i].half_length = car.length / 2
         samples[i].wreck, samples[i].astray, samples[i].lanes, samples[i].path = car.wreck, False, 0, -1
         samples[i].alert, samples[i].strays, samples[i].ways = car.alert, False, _ALL
         before = count

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rss_shield.shield._numba.compiled import apart, compiled, inner
+from rss_shield.shield.geometry import wrap_angle
 from rss_shield.shield.junctions.followers import is_behind
 from rss_shield.shield.junctions.plans import NEVER, STOP, look_ahead, meets_braking
 from rss_shield.shield.junctions.reach import STANDING
@@ -18,9 +19,11 @@ from rss_shield.shield.verdicts import (
     CRASHED,
     CUT_IN,
     GAVE_NO_WAY,
+    JUMPED,
     KEPT,
     LEFT_NO_PLAN,
     LEFT_PATHS,
+    NOBODY,
     OTHER,
     REVERSED,
     TOO_FAR,
@@ -34,6 +37,11 @@ from rss_shield.shield.verdicts import (
 _TOLERANCE = 1e-6
 _REVERSING = 0.1  # slower than this backwards is standing [m/s]
 _JITTER = 0.02  # speeds of others are read off a simulator that integrates in steps [m/s]
+_JUMP = 0.1  # likewise their places [m]
+_SEEN, _FAINT = (
+    1.0,
+    1e-6,
+)  # shares of these tolerances: what counts at once, and what counts where nothing else does (J14)
 
 
 @compiled
@@ -76,6 +84,7 @@ def judge_user(scene, i, sample, memory, a, strongest, clear, trapped):
     if items != 0:
         memory.items, memory.since = items, 0
         memory.other_broke, memory.other_excess = KEPT, 0.0
+        memory.faint, memory.faint_excess = KEPT, 0.0
         # having braked too hard in front of a follower counts until that has its distance again
         if memory.ego_broke != TOO_HARD or gap_is_safe or not may_follow:
             memory.ego_broke, memory.ego_excess = KEPT, 0.0
@@ -92,7 +101,8 @@ def judge_user(scene, i, sample, memory, a, strongest, clear, trapped):
     if trapped and not kept and not cut_in:
         kept = is_resolute(scene, a)
     memory.follows, memory.way = may_follow, scene.track.path
-    memory.x, memory.y, memory.speed, memory.lanes = sample.x, sample.y, sample.speed, sample.next_lanes
+    memory.x, memory.y, memory.heading = sample.x, sample.y, sample.heading
+    memory.speed, memory.lanes = sample.speed, sample.next_lanes
     memory.reachable, memory.path, memory.ways = sample.reachable, sample.path, sample.ways
     memory.wreck, memory.astray = sample.wreck, sample.astray
     memory.age += 1
@@ -102,35 +112,62 @@ def judge_user(scene, i, sample, memory, a, strongest, clear, trapped):
 
 @inner
 def _judge_motion(sample, memory, other, dt):
-    """Did a road user leave the bounds that plans assume, since the last sample?"""
+    """Did a road user leave the bounds that plans assume, since the last sample?
+
+    By less than the tolerances it may do so for long, and get far: that counts where nothing else explains a contact
+    (J14).
+    """
     if memory.age == 0:
         return
-    faster = sample.speed - max(memory.speed, min(memory.speed + other.a_max_accel * dt, other.v_cap))
-    slower = memory.speed - other.a_max_brake * dt - sample.speed
-    duty, excess = KEPT, 0.0
-    if sample.wreck and (not memory.wreck or np.hypot(sample.x - memory.x, sample.y - memory.y) > _JITTER * dt):
-        duty = CRASHED
-    elif _leaves_paths(sample, memory):
-        duty = LEFT_PATHS
-    elif faster > _JITTER and not sample.wreck:
-        duty, excess = ACCELERATED, faster / dt
-    elif slower > _JITTER and not sample.wreck:
-        duty, excess = BRAKED, slower / dt
-    elif sample.speed < -_REVERSING:
-        duty, excess = REVERSED, -sample.speed
-    elif memory.relied_before or (memory.counted_on > 0 and abs(sample.speed) >= STANDING):
-        duty = GAVE_NO_WAY  # forgotten by `judge_user` if the ego still has a plan
-    if duty != KEPT and memory.other_broke == KEPT:
-        memory.other_broke, memory.other_excess = duty, excess
+    duty, excess = _broken(sample, memory, other, dt, _FAINT)
+    if duty == KEPT:
+        return
+    if memory.faint == KEPT:
+        memory.faint, memory.faint_excess = duty, excess
+    if memory.other_broke == KEPT:
+        memory.other_broke, memory.other_excess = _broken(sample, memory, other, dt, _SEEN)
 
 
 @inner
-def _leaves_paths(sample, memory):
+def _broken(sample, memory, other, dt, share):
+    """(duty, excess) that a road user has broken since the last sample, with a share of the tolerances."""
+    faster = sample.speed - max(memory.speed, min(memory.speed + other.a_max_accel * dt, other.v_cap))
+    slower = memory.speed - other.a_max_brake * dt - sample.speed
+    jumped = _jump(sample, memory, dt)
+    if sample.wreck and (not memory.wreck or np.hypot(sample.x - memory.x, sample.y - memory.y) > _JITTER * dt):
+        return CRASHED, 0.0
+    if jumped > share * _JUMP and not sample.wreck:
+        return JUMPED, jumped
+    if _leaves_paths(sample, memory, share * STANDING):
+        return LEFT_PATHS, 0.0
+    if faster > share * _JITTER and not sample.wreck:
+        return ACCELERATED, faster / dt
+    if slower > share * _JITTER and not sample.wreck:
+        return BRAKED, slower / dt
+    if sample.speed < -share * _REVERSING:
+        return REVERSED, -sample.speed
+    if memory.relied_before or (memory.counted_on > 0 and abs(sample.speed) >= STANDING):
+        return GAVE_NO_WAY, 0.0  # forgotten by `judge_user` if the ego still has a plan
+    return KEPT, 0.0
+
+
+@inner
+def _jump(sample, memory, dt):
+    """How much farther than its wheels took it a road user has moved, or has turned its ends, in a frame [m]."""
+    way = max(abs(sample.speed), abs(memory.speed)) * dt
+    moved = np.hypot(sample.x - memory.x, sample.y - memory.y)
+    turned = abs(wrap_angle(sample.heading - memory.heading)) * sample.half_length
+    return max(moved, turned) - way
+
+
+@inner
+def _leaves_paths(sample, memory, standing):
     """Has a road user gone where none of its ways leads? Who is off all of them is expected to stand, or to come back.
 
     So whoever drives on there has left them anew on every sample, also one that has never been on any (J12).
+    `standing`: slower than this is standing [m/s].
     """
-    off = sample.astray and not (memory.astray and abs(sample.speed) < STANDING)
+    off = sample.astray and not (memory.astray and abs(sample.speed) < standing)
     return off or sample.strays or sample.lanes & ~memory.lanes != 0
 
 
@@ -191,4 +228,8 @@ def judge_crossing(sample, memory, outside, other, dt):
         if memory.other_broke == KEPT:
             memory.other_broke = TOO_FAR
         return judged(OTHER, memory.items, memory)
-    return judged(who_broke(memory, memory.items == 0), memory.items, memory)
+    verdict = who_broke(memory, memory.items == 0)
+    if verdict == NOBODY and memory.faint != KEPT:
+        memory.other_broke, memory.other_excess = memory.faint, memory.faint_excess
+        verdict = OTHER
+    return judged(verdict, memory.items, memory)

@@ -23,6 +23,7 @@ CROSSING = records(
         ("astray", "?"),  # was on no path then
         ("x", "f8"),  # at the last sample
         ("y", "f8"),
+        ("heading", "f8"),
         ("speed", "f8"),
         ("lanes", "i8"),  # lanes on which it may be now or next, as a set of bits
         ("ways", "i8"),  # paths that it may be on, likewise
@@ -31,6 +32,11 @@ CROSSING = records(
         ("ego_excess", "f8"),
         ("other_broke", "i8"),
         ("other_excess", "f8"),
+        (
+            "faint",
+            "i8",
+        ),  # likewise, also by less than is tolerated: counts where nothing else explains a contact
+        ("faint_excess", "f8"),
         ("was_lawless", "?"),  # the other broke one up to this sample, though the ego may have a plan toward it again
     ]
 )
@@ -40,6 +46,8 @@ SAMPLE = records(
     [
         ("x", "f8"),
         ("y", "f8"),
+        ("heading", "f8"),
+        ("half_length", "f8"),
         ("speed", "f8"),
         ("lanes", "i8"),  # lanes on which it may be, as a set of bits
         ("next_lanes", "i8"),  # these and the ones that follow

@@ -17,6 +17,7 @@ from rss_shield.shield.open_space.pair import HAS_WAY, permits, role_of
 from rss_shield.shield.open_space.trajectory import intention
 from rss_shield.shield.verdicts import (
     ACCELERATED,
+    JUMPED,
     KEPT,
     NOBODY,
     STEERED,
@@ -28,6 +29,7 @@ from rss_shield.shield.verdicts import (
 )
 
 _SPEED, _ANGLE, _GAP = 1e-6, 1e-3, 0.02  # what rounding may cost [m/s], [rad], [m]
+_PLACE = 1e-3  # likewise of a way that speed explains [m]
 _ROLLS = 0.05  # slower than this the wheels of another can't be seen [m/s]
 _UNSEEN = 10.0  # stands for their slip then
 
@@ -56,6 +58,14 @@ def _limits_kept(before, after, driver, dt):
 
 
 @part
+def _jump(before, after, dt):
+    """How much farther than its wheels took it one has moved, or has turned its ends, during a frame [m]."""
+    moved = np.hypot(after.x - before.x, after.y - before.y)
+    turned = np.abs(wrap_angle(after.heading - before.heading)) * before.half_length
+    return max(moved, turned) - max(np.abs(before.speed), np.abs(after.speed)) * dt
+
+
+@part
 def _duty(before, after, other, memory, is_ego, table, space, work):
     """Duty that one of two has broken during a frame toward the other, and by how much.
 
@@ -65,6 +75,9 @@ def _duty(before, after, other, memory, is_ego, table, space, work):
       work: `[6, K, ROW_FIELDS]` scratch.
     """
     dt, driver = table.dt, space.pedestrian if before.kind == PEDESTRIAN else table.other
+    jumped = _jump(before, after, dt)
+    if jumped > _PLACE and before.kind != PEDESTRIAN:
+        return JUMPED, jumped
     if before.kind == FIXED:
         return KEPT, 0.0
     broke, excess = _limits_kept(before, after, driver, dt)
