@@ -117,6 +117,13 @@ def test_what_is_no_run_is_refused_in_one_line(tmp_path, capsys):
         run([str(tmp_path)])
     assert stop.value.code == 2
     assert "expected a finished run (config.json, episodes.csv) or sweep" in capsys.readouterr().err
+    for arguments, message in (
+        ([], "name a run or sweep folder"),
+        ([str(tmp_path), "--out", __file__], f"--out {__file__}: expected a folder"),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            run(arguments)
+        assert stop.value.code == 2 and message in capsys.readouterr().err
 
 
 def test_latex_takes_every_sign():

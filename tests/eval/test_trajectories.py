@@ -157,5 +157,20 @@ def test_a_file_is_judged_from_the_command_line(tmp_path, capsys):
     out = capsys.readouterr().out
     assert "7 in danger with 8 (inherited, rear)" in out and "contact of 7 and 8" in out and "at fault: 7" in out
     for option, message in ((["--columns", "z=alt"], "--columns z"), (["--lanes-at", "left"], "expected numbers")):
-        with pytest.raises(SystemExit, match=message):
-            main(["judge", str(tmp_path / "log.csv"), *option])
+        assert message in refused(capsys, "judge", str(tmp_path / "log.csv"), *option)
+
+
+def refused(capsys, *arguments):
+    """The one line in which a command says why it does nothing."""
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    said = capsys.readouterr()
+    assert end.value.code == 2 and not said.out and said.err.count("\n") == 1
+    return said.err
+
+
+def test_who_is_alone_has_nobody_to_be_judged_against(tmp_path, capsys):
+    table = rows(t=TIME, x=X, y=Y)
+    path = written(table[table["id"] == 7], tmp_path)
+    assert "log.csv: 1 road user: nobody to judge against" in refused(capsys, "judge", str(path))

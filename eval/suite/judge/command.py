@@ -1,13 +1,12 @@
 """`rss-shield judge`: who was to blame in any log."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rss_shield.eval.files import atomic, plainly, write_json
+from rss_shield.eval.files import atomic, folder_for, refuse, write_json
 from rss_shield.eval.suite.judge.findings import json_of, pair_frames, text_of
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.risk import risk_lines, risk_table
@@ -23,7 +22,7 @@ def run(arguments: list[str] | None = None) -> None:
         for path in options.files:
             _judge(path, options)
     except (ValueError, OSError, ModuleNotFoundError) as error:
-        sys.exit(f"rss-shield judge: {plainly(error)}")
+        refuse("rss-shield judge", error)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -54,27 +53,29 @@ def _parser() -> argparse.ArgumentParser:
 
 def _judge(path: Path, options: argparse.Namespace) -> None:
     trace = read(path, options)
+    if len(trace.users.ids) < 2:
+        raise ValueError(f"{path}: {len(trace.users.ids)} road user: nobody to judge against; expected two at least")
     unknown = [name for name in options.ego if name not in trace.users.ids]
     if unknown:
         raise ValueError(f"--ego {unknown[0]}: expected one of {', '.join(trace.users.ids)}")
+    out = None if options.out is None else folder_for(options.out)
     users = [trace.users.ids.index(name) for name in options.ego] or None
     judgement = judge_trace(trace, _table(trace, options), users=users)
     print(text_of(judgement, path.name))
     risk = risk_table(trace, users or range(len(trace.users.ids))) if options.risk else None
     if risk is not None:
         print("\n".join(risk_lines(risk)))
-    if options.out is not None:
+    if out is not None:
         from rss_shield.eval.suite.judge.pictures import draw
 
-        options.out.mkdir(parents=True, exist_ok=True)
-        write_json(options.out / f"{path.stem}.json", json_of(judgement, path.name))
-        with atomic(options.out / f"{path.stem}.csv") as temporary:
+        write_json(out / f"{path.stem}.json", json_of(judgement, path.name))
+        with atomic(out / f"{path.stem}.csv") as temporary:
             pair_frames(judgement, not options.all_frames).to_csv(temporary, index=False)
-        draw(judgement, options.out / f"{path.stem}.png")
+        draw(judgement, out / f"{path.stem}.png")
         if risk is not None:
-            with atomic(options.out / f"{path.stem}-risk.csv") as temporary:
+            with atomic(out / f"{path.stem}-risk.csv") as temporary:
                 risk.to_csv(temporary, index=False)
-        print(f"written to {options.out}: {path.stem}.json, {path.stem}.csv, {path.stem}.png")
+        print(f"written to {out}: {path.stem}.json, {path.stem}.csv, {path.stem}.png")
 
 
 def _table(trace: Trace, options: argparse.Namespace) -> str | Preset | None:
