@@ -311,7 +311,7 @@ def test_the_command_records(tmp_path, capsys):
     [
         (["judge", "{}/none.npz"], r"judge: .*/none\.npz: no such file or directory$"),
         (["judge", "{}/none.csv"], r"judge: .*/none\.csv: no such file or directory$"),
-        (["judge", "{}/one.npz", "--params", "carlo"], "params = 'carlo': expected one of"),
+        (["judge", "{}/one.npz", "--params", "carlo"], "preset = 'carlo': expected one of"),
         (["judge", "{}/one.npz", "--ego", "middle"], "--ego middle: expected one of rear, front"),
         (["record", "highway-fast-v0", "--policy", "nobody:here", "--out", "x.npz"], "nobody:here: no module 'nobody'"),
         (["record", "highway-fast-v0", "--out", "{}"], r"--out .*: expected a file"),
