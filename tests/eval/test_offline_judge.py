@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from rss_shield import make
 from rss_shield.cli import main
@@ -14,6 +15,7 @@ from rss_shield.envs.highway.hostile import HOSTILE
 from rss_shield.envs.highway.recorder import Film, record_trace
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.lanes import see_all, table_of
+from rss_shield.eval.suite.judge.pictures import _gaps
 from rss_shield.shield.params import PRESETS
 from rss_shield.shield.trace import Trace, load, save, straight_lane, users_of
 from rss_shield.shield.verdicts import DUTIES
@@ -326,6 +328,13 @@ def test_what_can_not_be_done_is_said(tmp_path, arguments, message, capsys):
         main([one.format(tmp_path) for one in arguments])
     said = capsys.readouterr().err
     assert end.value.code == 2 and said.count("\n") == 1 and re.search(message, said)
+
+
+def test_a_picture_shows_the_whole_required_distance():
+    axes = Figure().subplots()
+    _gaps(axes, judge_trace(following(60.0, [], [], v=40.0), "ad-rss"), 0, 1)
+    required = max(np.nanmax(line.get_ydata()) for line in axes.lines if "required along" in line.get_label())
+    assert 120.0 < required < axes.get_ylim()[1]
 
 
 def test_a_driver_and_a_table_of_ones_own_are_recorded(tmp_path, monkeypatch):
