@@ -3,10 +3,11 @@
 import json
 import math
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -27,6 +28,48 @@ def plainly(error: Exception) -> str:
     if isinstance(error, OSError) and error.filename is not None and error.strerror is not None:
         return f"{error.filename}: {error.strerror[:1].lower()}{error.strerror[1:]}"
     return str(error)
+
+
+def refuse(program: str, error: Exception | str) -> NoReturn:
+    """End a command that was asked for what cannot be done: one line says what, the exit code is 2."""
+    text = plainly(error) if isinstance(error, Exception) else error
+    print(f"{program}: error: {' '.join(text.split())}", file=sys.stderr)
+    raise SystemExit(2)
+
+
+def folder_for(path: str | Path, option: str = "--out") -> Path:
+    """A folder to write into, which is there from now on. Asked for before the work, of which nothing is then lost.
+
+    Raises:
+      ValueError: there is a file in its place, or nothing may be written there.
+    """
+    path = Path(path)
+    taken = next((one for one in (path, *path.parents) if one.exists() and not one.is_dir()), None)
+    if taken is not None:
+        raise ValueError(f"{option} {path}: expected a folder; {taken} is a file")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"{option} {path}: expected a folder that can be written; {plainly(error)}") from None
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise ValueError(f"{option} {path}: expected a folder that can be written; permission denied")
+    return path
+
+
+def file_for(path: str | Path, option: str = "--out") -> Path:
+    """A file to write, whose folder is there from now on; as `folder_for`.
+
+    Raises:
+      ValueError: it is a folder, or nothing may be written there.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise ValueError(f"{option} {path}: expected a file; it is a folder")
+    try:
+        folder_for(path.parent, option)
+    except ValueError as error:
+        raise ValueError(str(error).replace(f"{option} {path.parent}", f"{option} {path}", 1)) from None
+    return path
 
 
 def write_text(path: Path, text: str) -> None:

@@ -28,7 +28,7 @@ from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import WAITING
 from rss_shield.eval.arms import CONTINUOUS, OFF_AND_ON
 from rss_shield.eval.config_option import split_arguments, with_values
-from rss_shield.eval.files import atomic, write_json
+from rss_shield.eval.files import atomic, folder_for, write_json
 from rss_shield.eval.metrics import summarise
 from rss_shield.eval.own import digests, driver_named, is_own
 from rss_shield.eval.progress import move_to, progress_bar
@@ -114,6 +114,7 @@ def main(arguments: list[str]) -> None:
         tests = tests_of(config, card)
         params = preset_of(config, card)
         check_spaces(config, params, policy, next(iter(tests.values())))
+        folder_for(config.out)
     except (ValueError, OSError, ImportError) as error:
         fail(PROGRAM, f"{type(error).__name__}: {error}" if isinstance(error, ImportError) else str(error))
     played = []
@@ -299,7 +300,6 @@ def play(
 
 def report(config: Config, params: Any, episodes: pd.DataFrame) -> None:
     """Print the table; write it, the episodes and what they depend on."""
-    config.out.mkdir(parents=True, exist_ok=True)
     summary = summarise(episodes)
     title = f"{config.policy} on {config.env_id}, {config.episodes} episodes"
     with atomic(config.out / "episodes.csv") as temporary:

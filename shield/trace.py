@@ -322,14 +322,16 @@ def load(path: str | Path) -> Trace:
       FileNotFoundError: there is none.
     """
     path = Path(path)
+    if path.suffix != ".npz" and path.is_file() and not zipfile.is_zipfile(path):
+        raise ValueError(f"{path}: expected a file .npz (a trace; rss-shield judge reads .csv and .xml, too)")
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         text = json.loads(arrays["text"].tobytes())
     except FileNotFoundError:
         raise
-    except (AttributeError, EOFError, KeyError, OSError, ValueError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{path}: expected a file with a trace ({type(error).__name__}: {error})") from None
+    except (AttributeError, EOFError, KeyError, OSError, ValueError, zipfile.BadZipFile):
+        raise ValueError(f"{path}: expected a file with a trace (.npz), which this is not or is damaged") from None
     if not isinstance(text, dict) or text.get("format") != FORMAT:
         raise ValueError(f"{path}: expected a file with a trace, of format {FORMAT!r}")
     if text["version"] != VERSION:

@@ -132,6 +132,7 @@ def test_algorithms_that_share_a_policy_are_told_apart(tmp_path):
         ("my_driver:faster --config.lane-count 3", "the nearest is config.lanes_count"),
         ("MODEL --env-id intersection-v0", "made for observations (5, 5), but intersection-v0 has (15, 7)"),
         ("MODEL --env-id merge-v0 --config.observation.vehicles-count 7", "but merge-v0 has (7, 5)"),
+        (f"MODEL --out {__file__}", "expected a folder"),
     ],
 )
 def test_what_goes_wrong_ends_in_one_line_and_exit_code_2(arguments, message, model, capsys):

@@ -6,13 +6,13 @@
 Writes OUT/index.html (self-contained), report.md, report.tex, and figures/RUN/*.png and .pdf. Nothing is trained.
 """
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
+from rss_shield.eval.files import folder_for, refuse
 from rss_shield.eval.paper.read import across_roads, section_of
 from rss_shield.eval.paper.render import write_report
 from rss_shield.eval.provenance import records_of
@@ -30,14 +30,18 @@ class Arguments:
     """Heading of the page."""
 
 
-def write(runs: tuple[Path, ...], out: Path, title: str) -> Path:
-    """Write the report; returns the page.
+def write(runs: tuple[Path, ...], out: Path | None, title: str) -> Path:
+    """Write the report; returns the page, by default in report/ of the first run.
 
     Raises:
       ValueError: no run, or a folder that holds no finished one.
     """
     if not runs:
-        raise ValueError("runs: expected at least one folder")
+        raise ValueError("name a run or sweep folder, such as runs/highway-fast-v0")
+    unknown = next((run for run in runs if not run.is_dir()), None)
+    if unknown is not None:
+        raise ValueError(f"{unknown}: expected the folder of a finished run or sweep")
+    out = folder_for(out or runs[0] / "report")
     sections = [section_of(run, out / "figures" / run.name) for run in runs]
     together = across_roads(runs, out / "figures" / "roads")
     sections += [together] if together else []
@@ -66,8 +70,7 @@ def run(arguments: list[str]) -> None:
     """What a command line asks for."""
     given = tyro.cli(Arguments, prog="rss-shield report", description=__doc__, args=arguments)
     try:
-        page = write(given.runs, given.out or given.runs[0] / "report", given.title)
+        page = write(given.runs, given.out, given.title)
     except (ValueError, OSError, IndexError) as error:
-        print(f"rss-shield report: error: {' '.join(str(error).split())}", file=sys.stderr)
-        raise SystemExit(2) from None
+        refuse("rss-shield report", error)
     print(f"written: {page}, report.md, report.tex, figures/")

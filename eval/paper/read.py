@@ -120,7 +120,8 @@ def _figures_of_run(folder: Path, figures: Path, config: dict[str, Any], episode
 
 
 def _of_sweep(folder: Path, figures: Path) -> Section:
-    experiment = json.loads((folder / "experiment.json").read_text(encoding="utf-8"))["experiment"]
+    record = json.loads((folder / "experiment.json").read_text(encoding="utf-8"))
+    experiment = record["experiment"]
     points = pd.read_csv(folder / "points.csv")
     axes = [name for name in points.columns if name not in ("metric", "value", "low", "high", "n", "over")]
     safety, performance = experiment["safety"], experiment["performance"]
@@ -141,8 +142,14 @@ def _of_sweep(folder: Path, figures: Path) -> Section:
                 figures / "pareto.png",
             )
         ],
-        command=f"rss-shield sweep experiments/{experiment['name']}.yaml",
+        command=f"rss-shield sweep {file_of(record)}",
     )
+
+
+def file_of(record: dict[str, Any]) -> str:
+    """The experiment file that a sweep was called with; where it has not recorded that, one of its name."""
+    own = Path("experiments") / f"{record['experiment']['name']}.yaml"
+    return record.get("file") or str(own if own.exists() else own.name)
 
 
 def read_episodes(folder: Path) -> pd.DataFrame:

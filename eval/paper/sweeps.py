@@ -15,6 +15,7 @@ import pandas as pd
 from rss_shield.eval.files import atomic
 from rss_shield.eval.pages import write_page
 from rss_shield.eval.paper import words
+from rss_shield.eval.paper.read import file_of
 from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.runs.points import APART, groups_of, with_front
 from rss_shield.eval.runs.tables import markdown_of, plot_front, shown_metrics, texts, wide
@@ -50,13 +51,13 @@ def section_of(folder: Path, out: Path) -> list[str]:
     sentences = words.of_sweep(table, inner, groups, safety, performance)
     fixed = experiment["options"]
     return [
-        f"## `experiments/{experiment['name']}.yaml`",
+        f"## `{file_of(record)}`",
         experiment["about"],
         f"{int(points['n'].max())} episodes a row" + (f"; all with {json.dumps(fixed)}." if fixed else "."),
         "\n".join(f"- {sentence}" for sentence in sentences),
         f"![Safety and performance of {experiment['name']}]({picture.name})",
         markdown_of(texts(table, axes, shown_metrics(table, safety, performance))),
-        f"```sh\nrss-shield sweep experiments/{experiment['name']}.yaml\n```",
+        f"```sh\nrss-shield sweep {file_of(record)}\n```",
         provenance([record]),
     ]
 

@@ -1,8 +1,6 @@
 """`rss-shield record`: one episode of an environment into a trace."""
 
 import argparse
-import importlib
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,9 @@ import numpy as np
 
 from rss_shield.envs.highway.recorder import record_trace
 from rss_shield.envs.make import make
-from rss_shield.shield.params import PRESETS
+from rss_shield.eval.files import file_for, refuse
+from rss_shield.eval.own import driver_named, is_own
+from rss_shield.eval.suite.own_table import KNOWN_PRESETS, preset_in
 from rss_shield.shield.trace import save
 
 SHIELDS = {"on": "override", "off": "monitor"}  # off: it watches only, so that the trace has a verdict
@@ -22,33 +22,36 @@ def run(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="rss-shield record", description="Record one episode as a trace.")
     parser.add_argument("env", help="such as highway-fast-v0")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--policy", default="faster", help="faster, random, or MODULE:FUNCTION of an observation")
+    parser.add_argument("--policy", default="faster", help="faster, random, or MODULE:FUNCTION, as for rss-shield test")
+    parser.add_argument("--one-by-one", action="store_true", help="the function maps one observation to one action")
     parser.add_argument("--shield", choices=SHIELDS, default="on")
-    parser.add_argument("--params", help=f"preset: {', '.join(PRESETS)}")
-    parser.add_argument("--out", type=Path, required=True, help="file, NAME.npz")
+    parser.add_argument("--preset", "--params", help=f"RSS parameters: {KNOWN_PRESETS}")
+    parser.add_argument("--out", type=Path, help="file (default: ENV-seedSEED.npz)")
     options = parser.parse_args(arguments)
     try:
-        env = make(options.env, SHIELDS[options.shield], options.params)
-        trace = record_trace(env, policy_of(options.policy, env, options.seed), options.seed)
-    except ValueError as error:
-        sys.exit(f"rss-shield record: {error}")
-    save(trace, options.out)
+        if options.seed < 0:
+            raise ValueError(f"--seed {options.seed}: expected a whole number >= 0")
+        preset = None if options.preset is None else preset_in(options.preset)
+        env = make(options.env, SHIELDS[options.shield], preset)
+        policy = policy_of(options.policy, env, options.seed, options.one_by_one)
+        out = file_for(options.out or f"{options.env.replace('/', '-')}-seed{options.seed}.npz")
+        trace = record_trace(env, policy, options.seed)
+        save(trace, out)
+    except (ValueError, OSError) as error:
+        refuse("rss-shield record", error)
     said = ", ".join(contact.verdict for contact in trace.contacts)
-    print(f"{options.out}: {len(trace.time)} samples, {len(trace.users.ids)} road users, blame: {said or 'no contact'}")
+    print(f"{out}: {len(trace.time)} samples, {len(trace.users.ids)} road users, blame: {said or 'no contact'}")
 
 
-def policy_of(name: str, env: Any, seed: int) -> Callable[[Any], Any]:
-    """A policy by name.
+def policy_of(name: str, env: Any, seed: int, one_by_one: bool = False) -> Callable[[Any], Any]:
+    """A policy by name; functions take observations `[1, ...]`, as they do of all that are tested at once.
 
     Raises:
       ValueError: there is no such policy, or none for this environment.
     """
-    if ":" in name:
-        module, function = name.split(":", 1)
-        try:
-            return getattr(importlib.import_module(module), function)
-        except (ImportError, AttributeError) as error:
-            raise ValueError(f"policy = {name!r}: {error}") from None
+    if is_own(name):
+        own = driver_named(name, one_by_one)
+        return lambda observation: own(np.asarray(observation)[None])[0]
     space = env.action_space
     if name == "random":
         space.seed(np.random.SeedSequence(seed).generate_state(1).tolist()[0])

@@ -23,13 +23,15 @@ from rss_shield.envs.highway.recorder import record_trace
 from rss_shield.envs.make import make
 from rss_shield.envs.make_vec import make_vec
 from rss_shield.envs.roads.hostile import HOSTILE
-from rss_shield.eval.files import write_json
+from rss_shield.eval.files import folder_for, refuse, write_json
+from rss_shield.eval.own import digests
 from rss_shield.eval.rollout import NO_CONTACT, evaluate
 from rss_shield.eval.stats import clopper_pearson
 from rss_shield.eval.suite.assault import CONTINUOUS, FREE, POLICIES, STEERED, policy_of
+from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
 from rss_shield.eval.suite.stress_page import write_page
 from rss_shield.eval.suite.watched import Watched
-from rss_shield.shield.params import PRESETS
+from rss_shield.shield.params import Preset
 from rss_shield.shield.trace import save
 from rss_shield.shield.verdicts import AT_FAULT, VERDICTS
 
@@ -44,7 +46,7 @@ class Block(NamedTuple):
 
     env_id: str
     policy: str
-    params: str  # "" = what the environment has
+    params: str  # preset or file; "" = what the environment has
     shield: str
     first: int  # seed
     episodes: int
@@ -54,10 +56,18 @@ class Block(NamedTuple):
     @property
     def name(self) -> str:
         """Of its file; the same block has the same, in any campaign."""
-        digest = hashlib.sha256(json.dumps(self).encode()).hexdigest()[:8]
+        files = digests([self.params])  # another state of a table is another block
+        told = [*self, files] if files else self
+        digest = hashlib.sha256(json.dumps(told).encode()).hexdigest()[:8]
+        table = Path(self.params).stem if is_file(self.params) else self.params or "own"
         mode = f"{self.shield}{'_judged' if self.judged else ''}"
-        kind = f"{self.env_id}_{self.policy}_{self.traffic}_{self.params or 'own'}_{mode}"
+        kind = f"{self.env_id}_{self.policy}_{self.traffic}_{table}_{mode}"
         return f"{kind}_{self.first}_{digest}.json"
+
+    @property
+    def table(self) -> Preset | None:
+        """In force; None = what the environment has."""
+        return preset_in(self.params) if self.params else None
 
     @property
     def config(self) -> dict[str, Any] | None:
@@ -101,7 +111,7 @@ def play(block: Block, threads: int = 1) -> dict[str, Any]:
     envs: list[Watched] = []
 
     def made(n: int) -> Any:
-        options: dict[str, Any] = {"params": block.params or None, "config": block.config, "threads": threads}
+        options: dict[str, Any] = {"params": block.table, "config": block.config, "threads": threads}
         env = make_vec(block.env_id, n, block.shield, autoreset_mode=AutoresetMode.DISABLED, **options)
         envs.append(Watched(env, block.judged))
         return envs[-1]
@@ -146,7 +156,7 @@ def counted(table: pd.DataFrame) -> dict[str, Any]:
 def keep_trace(block: Block, seed: int, actions: str, path: Path) -> str:
     """Play one episode of a block again on highway-env, into a file; returns the verdict there."""
     recorded = iter([_action(action) for action in actions.split()])
-    env = make(block.env_id, block.shield, block.params or None, config=block.config)
+    env = make(block.env_id, block.shield, block.table, config=block.config)
     stand_still = np.zeros(2, np.float32) if block.policy in FREE else 0
     trace = record_trace(env, lambda observation: next(recorded, stand_still), seed)
     save(trace, path)
@@ -178,7 +188,7 @@ def run(arguments: list[str] | None = None) -> None:
     parser.add_argument("--envs", default=",".join(DEFAULT_ENVS), help="separated by commas")
     parser.add_argument("--policies", default=",".join(POLICIES), help=f"separated by commas; also {', '.join(FREE)}")
     parser.add_argument("--traffic", default=STOCK, help=f"separated by commas: {STOCK}, {', '.join(HOSTILE)}, or all")
-    parser.add_argument("--params", default="", help=f"presets, separated by commas: {', '.join(PRESETS)}")
+    parser.add_argument("--preset", "--params", default="", help=f"separated by commas: {KNOWN_PRESETS}")
     parser.add_argument("--shield", choices=("override", "monitor"), default="override")
     parser.add_argument("--episodes", type=int, default=1000, help="of each kind")
     parser.add_argument("--block", type=int, default=1000, help="episodes in a file")
@@ -191,19 +201,24 @@ def run(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     if options.write is not None:
         try:
-            write_page(options.out, options.write, "rss-shield stress --write docs/results")
+            write_page(options.out, folder_for(options.write, "--write"), "rss-shield stress --write docs/results")
         except ValueError as error:
-            sys.exit(f"rss-shield stress: {error}")
+            refuse("rss-shield stress", error)
         return
-    if options.episodes < 1 or options.block < 1:
-        sys.exit(
-            f"rss-shield stress: --episodes {options.episodes} --block {options.block}: expected whole numbers >= 1"
-        )
-    envs, policies, presets = (text.split(",") for text in (options.envs, options.policies, options.params))
+    envs, policies, presets = (text.split(",") for text in (options.envs, options.policies, options.preset))
     traffic = [STOCK, *HOSTILE] if options.traffic == "all" else options.traffic.split(",")
-    options.out.mkdir(parents=True, exist_ok=True)
-    results = []
     numbers = options.seed, options.episodes, options.block
+    kinds = itertools.product(envs, policies, traffic, presets)
+    try:
+        for option, least in (("seed", 0), ("episodes", 1), ("block", 1), ("threads", 1)):
+            if getattr(options, option) < least:
+                raise ValueError(f"--{option} {getattr(options, option)}: expected a whole number >= {least}")
+        for kind in kinds:
+            _check(*kind)
+        folder_for(options.out)
+    except ValueError as error:
+        refuse("rss-shield stress", error)
+    results = []
     for block in blocks_of(envs, policies, presets, options.shield, *numbers, traffic, options.judged):
         path = options.out / block.name
         if path.exists():
@@ -212,13 +227,27 @@ def run(arguments: list[str] | None = None) -> None:
             try:
                 result = play(block, options.threads)
             except ValueError as error:
-                sys.exit(f"rss-shield stress: {error}")
+                refuse("rss-shield stress", error)
             write_json(path, result)
             print(f"{path.name}: {result['verdicts']}", flush=True)
         results.append(result)
         if result["bad"] and not options.go_on:
             _stop(block, result, path, results)
     print(summary(results))
+
+
+def _check(env_id: str, policy: str, traffic: str, preset: str) -> None:
+    """Can a kind be played at all?
+
+    Raises:
+      ValueError: what is wrong with it.
+    """
+    for option, value, known in (("policy", policy, (*POLICIES, *FREE)), ("traffic", traffic, (STOCK, *HOSTILE))):
+        if value not in known:
+            raise ValueError(f"{option} = {value!r}: expected one of {', '.join(known)}")
+    if preset:
+        preset_in(preset)
+    make(env_id, shield=None).close()
 
 
 def _stop(block: Block, result: dict[str, Any], path: Path, results: list[dict[str, Any]]) -> None:

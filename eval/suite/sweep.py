@@ -174,10 +174,11 @@ def check_tasks(tasks: list[Task]) -> None:
             setup_of(task.config["environment"], task.config["options"])
 
 
-def sweep(experiment: Experiment, folder: Path, work: Work = do_task, **run: Any) -> Sweep:
+def sweep(experiment: Experiment, folder: Path, work: Work = do_task, file: str = "", **run: Any) -> Sweep:
     """Run an experiment and write its points.
 
     Args:
+      file: the experiment's own, which pages name to do it again.
       run: backend, workers and address of `run_tasks`.
 
     Raises:
@@ -186,7 +187,7 @@ def sweep(experiment: Experiment, folder: Path, work: Work = do_task, **run: Any
     for name in (experiment.safety, experiment.performance):
         metric_named(name)
     folder.mkdir(parents=True, exist_ok=True)
-    for warning in _record(experiment, folder):
+    for warning in _record(experiment, folder, file):
         print(f"rss-shield sweep: warning: {warning}", file=sys.stderr)
     under_way = Sweep(experiment, folder, work, **run)
     under_way.run()
@@ -211,12 +212,12 @@ def with_episodes(experiment: Experiment, episodes: int | None) -> Experiment:
     return replace(experiment, tests={**experiment.tests, "episodes": episodes})
 
 
-def _record(experiment: Experiment, folder: Path) -> list[str]:
+def _record(experiment: Experiment, folder: Path, file: str) -> list[str]:
     """Write the experiment and the versions beside its results; says what changed since the first task."""
     path, now = folder / "experiment.json", json.loads(to_json(versions()))
     begun = path.exists() and any((folder / "tasks").glob("[!.]*"))
     before = json.loads(path.read_text(encoding="utf-8")) if begun else {"versions": now}
-    write_json(path, {"experiment": asdict(experiment), "versions": before["versions"]})
+    write_json(path, {"experiment": asdict(experiment), "file": file, "versions": before["versions"]})
     changed = [name for name in now if name in before["versions"] and now[name] != before["versions"][name]]
     return [
         f"{name} is not what it was when the first task of {folder} ran: remove the folder to run all anew"
@@ -232,6 +233,7 @@ def run(arguments: list[str]) -> None:
         done = sweep(
             experiment,
             given.runs_dir / experiment.name,
+            file=str(given.experiment),
             backend=given.backend,
             workers=given.workers,
             address=given.address,

@@ -1,9 +1,9 @@
 """`rss-shield replay`: traces to a page."""
 
 import argparse
-import sys
 from pathlib import Path
 
+from rss_shield.eval.files import file_for, refuse
 from rss_shield.eval.viewer.page import MOST, write_replay_page
 from rss_shield.shield.trace import load
 
@@ -20,8 +20,9 @@ def run(arguments: list[str]) -> None:
     parser.add_argument("--title", default="", metavar="TEXT", help="default: environment and seed")
     options = parser.parse_args(arguments)
     try:
-        write_replay_page([load(path) for path in options.traces], options.out, options.labels, options.title)
+        traces = [load(path) for path in options.traces]
+        write_replay_page(traces, file_for(options.out), options.labels, options.title)
     except (OSError, ValueError) as error:
-        sys.exit(f"rss-shield replay: {error}")
+        refuse("rss-shield replay", error)
     episodes = "one episode" if len(options.traces) == 1 else f"{len(options.traces)} episodes side by side"
     print(f"{options.out}: {episodes}, {options.out.stat().st_size / 1e3:.0f} kB")

@@ -1,10 +1,13 @@
 """Who judges a log afterwards says what the shield said on the spot, from whichever side the log is looked at."""
 
 import json
+import re
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from rss_shield import make
 from rss_shield.cli import main
@@ -12,9 +15,10 @@ from rss_shield.envs.highway.hostile import HOSTILE
 from rss_shield.envs.highway.recorder import Film, record_trace
 from rss_shield.eval.suite.judge.judgement import _joined, judge_trace
 from rss_shield.eval.suite.judge.lanes import see_all, table_of
+from rss_shield.eval.suite.judge.pictures import _gaps
 from rss_shield.eval.suite.judge.smoothing import filled_in
 from rss_shield.shield.params import PRESETS
-from rss_shield.shield.trace import Trace, save, straight_lane, users_of
+from rss_shield.shield.trace import Trace, load, save, straight_lane, users_of
 from rss_shield.shield.verdicts import DUTIES
 
 CROWD = {"vehicles_count": 6, "vehicles_density": 1.5, "lanes_count": 3, "duration": 20}
@@ -332,16 +336,37 @@ def test_the_command_records(tmp_path, capsys):
     [
         (["judge", "{}/none.npz"], r"judge: .*/none\.npz: no such file or directory$"),
         (["judge", "{}/none.csv"], r"judge: .*/none\.csv: no such file or directory$"),
-        (["judge", "{}/one.npz", "--params", "carlo"], "params = 'carlo': expected one of"),
+        (["judge", "{}/one.npz", "--params", "carlo"], "preset = 'carlo': expected one of"),
         (["judge", "{}/one.npz", "--ego", "middle"], "--ego middle: expected one of rear, front"),
-        (["record", "highway-fast-v0", "--policy", "nobody:here", "--out", "x.npz"], "policy = 'nobody:here'"),
+        (["record", "highway-fast-v0", "--policy", "nobody:here", "--out", "x.npz"], "nobody:here: no module 'nobody'"),
+        (["record", "highway-fast-v0", "--out", "{}"], r"--out .*: expected a file"),
+        (["judge", "{}/one.npz", "--out", "{}/one.npz"], r"--out .*: expected a folder"),
+        (["record", "highway-fast-v0", "--seed", "-1"], "--seed -1: expected a whole number >= 0"),
         (["record", "motorway-v7", "--out", "x.npz"], "motorway-v7"),
     ],
 )
-def test_what_can_not_be_done_is_said(tmp_path, arguments, message):
+def test_what_can_not_be_done_is_said(tmp_path, arguments, message, capsys):
     save(following(50.0, [], []), tmp_path / "one.npz")
-    with pytest.raises(SystemExit, match=message):
+    with pytest.raises(SystemExit) as end:
         main([one.format(tmp_path) for one in arguments])
+    said = capsys.readouterr().err
+    assert end.value.code == 2 and said.count("\n") == 1 and re.search(message, said)
+
+
+def test_a_picture_shows_the_whole_required_distance():
+    axes = Figure().subplots()
+    _gaps(axes, judge_trace(following(60.0, [], [], v=40.0), "ad-rss"), 0, 1)
+    required = max(np.nanmax(line.get_ydata()) for line in axes.lines if "required along" in line.get_label())
+    assert 120.0 < required < axes.get_ylim()[1]
+
+
+def test_a_driver_and_a_table_of_ones_own_are_recorded(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", list(sys.path))
+    (tmp_path / "slow_driver.py").write_text("def drive(seen):\n    return [4] * len(seen)\n")
+    (tmp_path / "mine.yaml").write_text("ego: {response_time: 0.6}")
+    main(["record", "highway-fast-v0", "--policy", "slow_driver:drive", "--preset", "mine.yaml"])
+    assert load("highway-fast-v0-seed0.npz").meta["judge_params"]["ego"]["response_time"] >= 0.6
 
 
 def test_duties_have_units_that_noise_can_be_compared_with():

@@ -14,6 +14,7 @@ from result_tables import episodes_of
 from rss_shield.eval.metrics import summarise
 from rss_shield.eval.paper.command import run, write
 from rss_shield.eval.paper.compared import as_texts, comparisons
+from rss_shield.eval.paper.read import file_of
 from rss_shield.eval.paper.render import escaped
 from rss_shield.eval.run_folder import versions
 
@@ -117,6 +118,19 @@ def test_what_is_no_run_is_refused_in_one_line(tmp_path, capsys):
         run([str(tmp_path)])
     assert stop.value.code == 2
     assert "expected a finished run (config.json, episodes.csv) or sweep" in capsys.readouterr().err
+    for arguments, message in (
+        ([], "name a run or sweep folder"),
+        ([str(tmp_path), "--out", __file__], f"--out {__file__}: expected a folder"),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            run(arguments)
+        assert stop.value.code == 2 and message in capsys.readouterr().err
+
+
+def test_the_file_of_a_sweep_is_that_which_was_called(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    record = {"experiment": {"name": "pol"}}
+    assert file_of(record) == "pol.yaml" and file_of({**record, "file": "mine/pol.toml"}) == "mine/pol.toml"
 
 
 def test_latex_takes_every_sign():

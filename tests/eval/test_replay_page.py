@@ -145,11 +145,18 @@ def test_the_command_writes_a_page_and_says_what_it_cannot_read(tmp_path, capsys
     )
     assert "2 episodes side by side" in capsys.readouterr().out
     assert [episode["label"] for episode in data_of(out.read_text())["episodes"]] == ["a", "b"]
-    with pytest.raises(SystemExit, match=r"rss-shield replay: .*nobody\.npz"):
-        main(["replay", str(tmp_path / "nobody.npz")])
+    main(["replay", str(tmp_path / "True.npz"), "--out", str(tmp_path / "new" / "page.html")])
+    assert (tmp_path / "new" / "page.html").exists()
     (tmp_path / "text.npz").write_text("no trace")
-    with pytest.raises(SystemExit, match=r"text\.npz: expected a file with a trace"):
-        main(["replay", str(tmp_path / "text.npz")])
+    for arguments, message in (
+        ([str(tmp_path / "nobody.npz")], "nobody.npz: no such file"),
+        ([str(tmp_path / "text.npz")], "text.npz: expected a file with a trace"),
+        ([str(tmp_path / "True.npz"), "--out", str(tmp_path)], f"--out {tmp_path}: expected a file"),
+    ):
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main(["replay", *arguments])
+        assert end.value.code == 2 and message in capsys.readouterr().err
 
 
 # ---------------------------------------------------------------- in a browser

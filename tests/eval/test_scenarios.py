@@ -48,5 +48,12 @@ def test_the_command_keeps_traces_and_pictures(tmp_path, capsys):
     assert "creeping up: off ego, on -: as derived" in capsys.readouterr().out
     assert load(tmp_path / "creeping_up_off.npz").meta["env_id"] == "scenario creeping up"
     assert (tmp_path / "creeping_up_on.png").stat().st_size > 10_000
-    with pytest.raises(SystemExit, match="no name contains parachutes"):
-        main(["scenarios", "parachutes"])
+    taken = tmp_path / "creeping_up_on.png"
+    for arguments, message in (
+        (["parachutes"], "no name contains parachutes"),
+        (["creeping up", "--traces", str(taken)], f"--traces {taken}: expected a folder"),
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(["scenarios", *arguments])
+        said = capsys.readouterr()
+        assert end.value.code == 2 and message in said.err and not said.out

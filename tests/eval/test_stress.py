@@ -63,10 +63,25 @@ def test_blocks_cover_every_seed_once():
     ("arguments", "message"),
     [
         (["--policies", "careful"], "policy = 'careful': expected one of random"),
-        (["--params", "carlo"], "params = 'carlo'"),
-        (["--episodes", "0"], "expected whole numbers >= 1"),
+        (["--params", "carlo"], "preset = 'carlo'"),
+        (["--episodes", "0"], "--episodes 0: expected a whole number >= 1"),
+        (["--seed", "-1"], "--seed -1: expected a whole number >= 0"),
+        (["--traffic", "stock,kind"], "traffic = 'kind': expected one of stock"),
+        (["--out", __file__], f"--out {__file__}: expected a folder"),
     ],
 )
-def test_what_can_not_be_played_is_said(tmp_path, arguments, message):
-    with pytest.raises(SystemExit, match=message):
-        main(["stress", *FEW, *arguments, "--out", str(tmp_path)])
+def test_what_can_not_be_played_is_said(tmp_path, arguments, message, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["stress", *FEW, "--out", str(tmp_path), *arguments])
+    said = capsys.readouterr()
+    assert end.value.code == 2 and message in said.err and not said.out
+
+
+def test_another_state_of_a_table_is_another_block(tmp_path):
+    path, names = tmp_path / "mine.yaml", set()
+    for time in (0.5, 0.6):
+        path.write_text(f"ego: {{response_time: {time}}}")
+        block = stress.Block("highway-fast-v0", "random", str(path), "override", 0, 8)
+        names.add(block.name)
+        assert block.table.ego.response_time == time
+    assert len(names) == 2 and all(name.startswith("highway-fast-v0_random_stock_mine_override_0_") for name in names)

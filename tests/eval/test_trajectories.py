@@ -1,5 +1,7 @@
 """CSV files of trajectories, ours and those of public data sets, are the cars that they were written from."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -156,6 +158,79 @@ def test_a_file_is_judged_from_the_command_line(tmp_path, capsys):
     main(["judge", str(written(table, tmp_path)), "--lanes-at", "0", "--params", "slides"])
     out = capsys.readouterr().out
     assert "7 in danger with 8 (inherited, rear)" in out and "contact of 7 and 8" in out and "at fault: 7" in out
-    for option, message in ((["--columns", "z=alt"], "--columns z"), (["--lanes-at", "left"], "expected numbers")):
-        with pytest.raises(SystemExit, match=message):
-            main(["judge", str(tmp_path / "log.csv"), *option])
+    for option, message in (
+        (["--columns", "z=alt"], "--columns z"),
+        (["--lanes-at", "left"], "expected finite numbers"),
+    ):
+        assert message in refused(capsys, "judge", str(tmp_path / "log.csv"), *option)
+
+
+def refused(capsys, *arguments):
+    """The one line in which a command says why it does nothing."""
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    said = capsys.readouterr()
+    assert end.value.code == 2 and not said.out and said.err.count("\n") == 1
+    return said.err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--lane-width 0", "--lane-width 0: expected a number > 0"),
+        ("--lane-width nan", "--lane-width nan"),
+        ("--lanes-at nan", "--lanes-at nan: expected finite numbers"),
+        ("--dt nan", "--dt nan: expected a number > 0"),
+        ("--dt 0", "--dt 0: expected a number > 0"),
+        ("--dt 5", "dt = 5: expected > 0 and <= 4 s"),
+        ("--response-time -1", "--response-time -1: expected a number > 0 and <= 60"),
+        ("--preset carlo", "preset = 'carlo': expected one of"),
+    ],
+)
+def test_options_out_of_range_are_named(tmp_path, capsys, options, message):
+    assert message in refused(capsys, "judge", str(written(rows(t=TIME, x=X, y=Y), tmp_path)), *options.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("empty.csv", "", "empty.csv: expected a header and rows; it is empty"),
+        ("log.csv", "id;t;x;y\n1;0;0;0\n", "expected commas"),
+        ("log.csv", "id,t,x,y\n1,0,0,0\n1,0.1,1,0,5,6\n", "line 3"),
+        ("log.csv", "id,t,x,y\n1,0,0,0,9\n", "row 2 has more values than the header has columns: expected 4"),
+        ("log.csv", "id,t,x,y\n1,0,0,0\n1,0.1,1\n", "row 3 has no y"),
+        ("log.csv", "id,t,x,y\n1,0,0,0\n1,0.1,inf,1\n", "x = inf in row 3: expected a finite number"),
+        ("log.csv", "id,t,x,y,kind\n1,0,0,0,car\n1,0.1,1,1,tank\n", "log.csv: kind = 'tank' in row 3: expected one of"),
+        ("log.csv", "id,t,x,y,length\n1,0,0,0,4\n1,0.1,1,1,-4\n", "length = -4 in row 3: expected a number > 0"),
+        ("table.yaml", "ego: {}", "table.yaml: expected a file .npz"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_named(tmp_path, capsys, name, text, message):
+    (tmp_path / name).write_text(text)
+    said = refused(capsys, "judge", str(tmp_path / name))
+    assert message in said and "np." not in said
+
+
+def test_options_of_csv_files_are_for_these_only(capsys):
+    assert "--dt 0.1: expected with .csv files only; a.npz" in refused(capsys, "judge", "a.npz", "--dt", "0.1")
+
+
+@pytest.mark.parametrize(
+    ("lane", "message"),
+    [
+        ('"centre": [[0, 0], [9, 0]], "width": -3', "lane 1: width = -3: expected a number > 0"),
+        ('"centre": [[0, 0]]', "lane 1: centre = [[0, 0]]: expected two points"),
+        ('"centre": [[0, 0], [1]]', "expected two points"),
+    ],
+)
+def test_lanes_that_are_none_are_named(tmp_path, lane, message):
+    (tmp_path / "lanes.json").write_text(f'{{"lanes": [{{"id": 1, {lane}}}]}}')
+    with pytest.raises(ValueError, match=re.escape(message)):
+        read_lanes(tmp_path / "lanes.json")
+
+
+def test_who_is_alone_has_nobody_to_be_judged_against(tmp_path, capsys):
+    table = rows(t=TIME, x=X, y=Y)
+    path = written(table[table["id"] == 7], tmp_path)
+    assert "log.csv: 1 road user: nobody to judge against" in refused(capsys, "judge", str(path))

@@ -42,9 +42,12 @@ def verdict_of(duel):
 # ---------------------------------------------------------------- off all ways
 
 
-@pytest.mark.parametrize(("speed", "verdict"), [(10.0, OTHER), (3.0, OTHER), (0.2, NOBODY)])
+@pytest.mark.parametrize(("speed", "verdict"), [(10.0, OTHER), (3.0, OTHER), (0.2, OTHER), (0.0, NOBODY)])
 def test_who_drives_on_where_no_way_leads_has_left_them_also_if_it_was_never_on_any(speed, verdict):
-    """A wrong-way driver is off all ways from first sight on (J12). One that stands is where plans expect it."""
+    """A wrong-way driver is off all ways from first sight on (J12). One that stands is where plans expect it.
+
+    One that creeps is not, and that counts where nothing else explains a contact (J14).
+    """
     sample, memory = np.zeros(1, SAMPLE)[0], np.zeros(1, CROSSING)[0]
     sample["astray"] = memory["astray"] = True
     sample["speed"] = memory["speed"] = speed
@@ -52,6 +55,15 @@ def test_who_drives_on_where_no_way_leads_has_left_them_also_if_it_was_never_on_
     found = judge_crossing(sample, memory, False, TABLE.other, DT)
     assert found.verdict == verdict
     assert DUTIES[found.other_duty] == ("left every path it could take" if verdict == OTHER else "")
+
+
+def test_a_breach_that_nobody_would_see_counts_only_where_nothing_else_does():
+    sample, memory = np.zeros(1, SAMPLE)[0], np.zeros(1, CROSSING)[0]
+    sample["speed"] = memory["speed"] = -0.05  # rolls back
+    memory["age"], memory["items"], memory["since"], memory["ego_broke"] = 5, 1, 3, LEFT_NO_PLAN
+    assert judge_crossing(sample, memory, False, TABLE.other, DT).verdict == AT_FAULT
+    memory["ego_broke"] = KEPT
+    assert judge_crossing(sample, memory, False, TABLE.other, DT).verdict == OTHER
 
 
 # ---------------------------------------------------------------- speed limits

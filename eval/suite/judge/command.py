@@ -1,29 +1,41 @@
 """`rss-shield judge`: who was to blame in any log."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rss_shield.eval.files import atomic, plainly, write_json
+from rss_shield.eval.files import atomic, folder_for, refuse, write_json
 from rss_shield.eval.suite.judge.findings import json_of, pair_frames, text_of
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.risk import risk_lines, risk_table
 from rss_shield.eval.suite.judge.trajectories import FORMATS, Format, read_csv, read_lanes, straight_lanes
-from rss_shield.shield.params import PRESETS, Preset
+from rss_shield.eval.suite.own_table import KNOWN_PRESETS, preset_in
+from rss_shield.shield.params import Preset
 from rss_shield.shield.trace import Lane, Trace, load
+
+# options that say what is in a CSV file, and what they are where they are not given
+_OF_CSV = {"format": "plain", "columns": "", "units": "", "y": None, "point": None, "dt": None, "lanes": None} | {
+    "lanes_at": "",
+    "lane_width": 3.5,
+}
 
 
 def run(arguments: list[str] | None = None) -> None:
     """Judge the files that the command line names."""
     options = _parser().parse_args(arguments)
     try:
-        for path in options.files:
-            _judge(path, options)
+        _check(options)
+        traces = [read(path, options) for path in options.files]
+        for path, trace in zip(options.files, traces, strict=True):
+            _check_users(path, trace, options)
+        if options.out is not None:
+            folder_for(options.out)
+        for path, trace in zip(options.files, traces, strict=True):
+            _judge(path, trace, options)
     except (ValueError, OSError, ModuleNotFoundError) as error:
-        sys.exit(f"rss-shield judge: {plainly(error)}")
+        refuse("rss-shield judge", error)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -33,7 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "files", nargs="+", type=Path, help="a trace (.npz), trajectories (.csv) or a CommonRoad scenario (.xml)"
     )
-    parser.add_argument("--params", help=f"preset to judge by: {', '.join(PRESETS)} (that of the trace, else slides)")
+    parser.add_argument("--preset", "--params", help=f"to judge by: {KNOWN_PRESETS} (that of the trace, else slides)")
     parser.add_argument("--response-time", type=float, help="of everybody, instead of the preset's [s]")
     parser.add_argument("--ego", action="append", default=[], metavar="ID", help="judge from this user's view only")
     parser.add_argument("--out", type=Path, help="folder for NAME.json, NAME.csv (pair-frames) and NAME.png")
@@ -52,40 +64,71 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _judge(path: Path, options: argparse.Namespace) -> None:
-    trace = read(path, options)
+def _check(options: argparse.Namespace) -> None:
+    """Can these options be meant, and of these files?
+
+    Raises:
+      ValueError: names one that can not.
+    """
+    for option, value, most in (
+        ("--lane-width", options.lane_width, 100.0),
+        ("--dt", options.dt, np.inf),
+        ("--response-time", options.response_time, 60.0),
+    ):
+        if value is not None and not (0.0 < value <= most and np.isfinite(value)):
+            reach = f" and <= {most:g}" if np.isfinite(most) else ""
+            raise ValueError(f"{option} {value:g}: expected a number > 0{reach}")
+    if options.preset is not None:
+        preset_in(options.preset)
+    _format(options)
+    _offsets(options)
+    if options.lanes is not None and options.lanes_at:
+        raise ValueError(f"--lanes-at {options.lanes_at}: expected either it or --lanes")
+    other = next((path for path in options.files if path.suffix != ".csv"), None)
+    given = [name for name, default in _OF_CSV.items() if getattr(options, name) != default]
+    if other is not None and given:
+        option = f"--{given[0].replace('_', '-')}"
+        raise ValueError(
+            f"{option} {getattr(options, given[0])}: expected with .csv files only; {other} says it itself"
+        )
+
+
+def _check_users(path: Path, trace: Trace, options: argparse.Namespace) -> None:
+    if len(trace.users.ids) < 2:
+        raise ValueError(f"{path}: {len(trace.users.ids)} road user: nobody to judge against; expected two at least")
     unknown = [name for name in options.ego if name not in trace.users.ids]
     if unknown:
         raise ValueError(f"--ego {unknown[0]}: expected one of {', '.join(trace.users.ids)}")
+
+
+def _judge(path: Path, trace: Trace, options: argparse.Namespace) -> None:
+    out = options.out
     users = [trace.users.ids.index(name) for name in options.ego] or None
     judgement = judge_trace(trace, _table(trace, options), users=users)
     print(text_of(judgement, path.name))
     risk = risk_table(trace, users or range(len(trace.users.ids))) if options.risk else None
     if risk is not None:
         print("\n".join(risk_lines(risk)))
-    if options.out is not None:
+    if out is not None:
         from rss_shield.eval.suite.judge.pictures import draw
 
-        options.out.mkdir(parents=True, exist_ok=True)
-        write_json(options.out / f"{path.stem}.json", json_of(judgement, path.name))
-        with atomic(options.out / f"{path.stem}.csv") as temporary:
+        write_json(out / f"{path.stem}.json", json_of(judgement, path.name))
+        with atomic(out / f"{path.stem}.csv") as temporary:
             pair_frames(judgement, not options.all_frames).to_csv(temporary, index=False)
-        draw(judgement, options.out / f"{path.stem}.png")
+        draw(judgement, out / f"{path.stem}.png")
         if risk is not None:
-            with atomic(options.out / f"{path.stem}-risk.csv") as temporary:
+            with atomic(out / f"{path.stem}-risk.csv") as temporary:
                 risk.to_csv(temporary, index=False)
-        print(f"written to {options.out}: {path.stem}.json, {path.stem}.csv, {path.stem}.png")
+        print(f"written to {out}: {path.stem}.json, {path.stem}.csv, {path.stem}.png")
 
 
-def _table(trace: Trace, options: argparse.Namespace) -> str | Preset | None:
+def _table(trace: Trace, options: argparse.Namespace) -> Preset | None:
     rho = options.response_time
     if rho is None:
-        return options.params
-    if options.params is None and "judge_params" in trace.meta:
-        raise ValueError("--response-time: expected --params beside it where the trace has a table of its own")
-    preset = PRESETS.get(options.params or "slides")
-    if preset is None or not rho > 0.0:
-        raise ValueError(f"--params {options.params} --response-time {rho}: expected a preset and a time > 0 [s]")
+        return None if options.preset is None else preset_in(options.preset)
+    if options.preset is None and "judge_params" in trace.meta:
+        raise ValueError("--response-time: expected --preset beside it where the trace has a table of its own")
+    preset = preset_in(options.preset or "slides")
     ego, other = (params._replace(response_time=rho) for params in (preset.ego, preset.other))
     return preset._replace(ego=ego, other=other)
 
@@ -129,9 +172,17 @@ def _lanes(path: Path, options: argparse.Namespace) -> tuple[Lane, ...]:
         return read_lanes(options.lanes)
     if not options.lanes_at:
         return ()
-    try:
-        offsets = [float(y) for y in options.lanes_at.split(",")]
-    except ValueError:
-        raise ValueError(f"--lanes-at {options.lanes_at}: expected numbers, separated by commas [m]") from None
+    offsets = _offsets(options)
     reach = read_csv(path, _format(options), (), options.dt).users.x
     return straight_lanes(offsets, options.lane_width, float(np.nanmin(reach)) - 500.0, float(np.nanmax(reach)) + 500.0)
+
+
+def _offsets(options: argparse.Namespace) -> list[float]:
+    """Middles of straight lanes."""
+    try:
+        offsets = [float(y) for y in options.lanes_at.split(",")] if options.lanes_at else []
+    except ValueError:
+        offsets = [np.nan]
+    if not np.isfinite(offsets).all():
+        raise ValueError(f"--lanes-at {options.lanes_at}: expected finite numbers, separated by commas [m]")
+    return offsets

@@ -122,9 +122,10 @@ def _gaps(axes: Any, judgement: Judgement, i: int, j: int) -> None:
         axes.plot(time, gap, color=colour, lw=1.2, label=f"gap {label}")
         axes.plot(time, required, color=colour, lw=1.0, ls="--", label=f"required {label}")
     axes.axhline(0.0, color="black", lw=0.5)
-    finite = np.concatenate([frames[name][there] for name in ("gap_lon", "required_lon", "gap_lat")])
-    if len(finite):
-        axes.set_ylim(min(float(finite.min()), -1.0) - 1.0, min(float(finite.max()), 120.0) + 2.0)
+    drawn = np.concatenate([frames[f"{what}_{name}"][there] for what in ("gap", "required") for name in ("lon", "lat")])
+    drawn = drawn[np.isfinite(drawn)]
+    if len(drawn):
+        axes.set_ylim(min(float(drawn.min()), -1.0) - 1.0, float(drawn.max()) + 2.0)
     _shade(axes, judgement, i, j)
     axes.set_ylabel("[m]")
     axes.legend(loc="upper right", ncols=4, frameon=False)

@@ -3,13 +3,13 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 import pandas as pd
 
 from rss_shield.eval.suite.judge.smoothing import derivative
-from rss_shield.shield.trace import Lane, Trace, straight_lane, users_of
+from rss_shield.shield.trace import KINDS, Lane, Trace, straight_lane, users_of
 
 LENGTH, WIDTH = 4.5, 1.8  # of a user whose size the log does not say [m]
 _SLOW = 0.5  # whoever is slower keeps the heading that it had [m/s]
@@ -84,18 +84,22 @@ def read_csv(
     known = FORMATS.get(columns) if isinstance(columns, str) else columns
     if known is None:
         raise ValueError(f"format = {columns!r}: expected one of {', '.join(FORMATS)}")
-    rows = pd.read_csv(path)
+    rows = _rows(path)
     for name in ("id", "t", "x", "y"):
         if getattr(known, name) not in rows.columns:
-            raise ValueError(
-                f"{path}: no column {getattr(known, name)!r} for {name}: expected one of {', '.join(rows.columns)}"
-            )
+            there = ", ".join(rows.columns)
+            hint = " (a file with another separator? expected commas)" if len(rows.columns) == 1 else ""
+            raise ValueError(f"{path}: no column {getattr(known, name)!r} for {name}: expected one of {there}{hint}")
     table = pd.DataFrame({name: _column(path, rows, known, name) for name in ("t", "x", "y")})
     table["id"] = rows[known.id]
+    if table["id"].isna().any():
+        _refuse_value(path, rows, known.id, table["id"].isna(), "a name or number")
     optional = ("heading", "speed", "length", "width")
     for name in optional:
         if getattr(known, name) in rows.columns:
             table[name] = _column(path, rows, known, name)
+            if name in ("length", "width") and not (table[name] > 0.0).all():
+                _refuse_value(path, rows, getattr(known, name), ~(table[name] > 0.0), "a number > 0")
     if known.frame_rate:
         table["t"] /= known.frame_rate
     if known.y_up:
@@ -106,8 +110,10 @@ def read_csv(
     if twice.any():
         user, t = table.loc[twice, "id"].iloc[0], table.loc[twice, "t"].iloc[0]
         raise ValueError(f"{path}: {known.id} = {user} is there twice at {known.t} = {t:g}: expected once")
-    step = dt or _step(path, table["t"].to_numpy())
+    step = _step(path, table["t"].to_numpy()) if dt is None else dt
     start, end = float(table["t"].min()), float(table["t"].max())
+    if not 0.0 < step <= end - start:
+        raise ValueError(f"{path}: dt = {step:g}: expected > 0 and <= {end - start:g} s, which is how long the log is")
     time = start + np.arange(round((end - start) / step) + 1) * step
     ids = list(dict.fromkeys(table["id"]))
     state = {name: np.full((len(time), len(ids)), np.nan) for name in ("x", "y", "heading", "speed")}
@@ -120,7 +126,10 @@ def read_csv(
         _put(own, time, step, length[i], width[i], known.point, {name: array[:, i] for name, array in state.items()})
     kinds = ["unknown"] * len(ids)
     if known.kind in rows.columns:
-        first = rows.drop_duplicates(known.id).set_index(known.id)[known.kind]
+        wrong = ~rows[known.kind].fillna("unknown").isin(KINDS)
+        if wrong.any() and not known.kinds:
+            _refuse_value(path, rows, known.kind, wrong, f"one of {', '.join(KINDS)}")
+        first = rows.drop_duplicates(known.id).set_index(known.id)[known.kind].fillna("unknown")
         kinds = [known.kinds.get(first[i], str(first[i]) if not known.kinds else "unknown") for i in ids]
     users = users_of(
         [str(i) for i in ids], kinds, length, width, state["x"], state["y"], state["heading"], state["speed"]
@@ -135,9 +144,32 @@ def _column(path: str | Path, rows: pd.DataFrame, known: Format, name: str) -> p
         raise ValueError(f"unit of {name} = {unit!r}: expected one of {', '.join(UNITS)}")
     values = pd.to_numeric(rows[column], errors="coerce")
     if not np.isfinite(values).all():
-        row = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise ValueError(f"{path}: {column} = {rows[column].iloc[row]!r} in row {row + 2}: expected a finite number")
+        _refuse_value(path, rows, column, ~np.isfinite(values), "a finite number")
     return values * (UNITS[unit] if unit else 1.0)
+
+
+def _rows(path: str | Path) -> pd.DataFrame:
+    """Of a file with commas."""
+    try:
+        rows = pd.read_csv(path)
+    except pd.errors.EmptyDataError:
+        raise ValueError(f"{path}: expected a header and rows; it is empty") from None
+    except (pd.errors.ParserError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: expected columns separated by commas, the same in every row: {error}") from None
+    if not isinstance(rows.index, pd.RangeIndex):  # what is too much in the first row is taken for names of rows
+        raise ValueError(f"{path}: row 2 has more values than the header has columns: expected {len(rows.columns)}")
+    if not len(rows):
+        raise ValueError(f"{path}: expected rows below its header; there are none")
+    return rows
+
+
+def _refuse_value(path: str | Path, rows: pd.DataFrame, column: str, wrong: Any, expected: str) -> NoReturn:
+    row = int(np.flatnonzero(wrong)[0])
+    value = rows[column].iloc[row]
+    if pd.isna(value):
+        raise ValueError(f"{path}: row {row + 2} has no {column}: expected {expected}, and {len(rows.columns)} values")
+    shown = repr(value) if isinstance(value, str) else value  # no names of types
+    raise ValueError(f"{path}: {column} = {shown} in row {row + 2}: expected {expected}")
 
 
 def _step(path: str | Path, times: np.ndarray) -> float:
@@ -218,11 +250,30 @@ def read_lanes(path: str | Path) -> tuple[Lane, ...]:
                 f"{path}: lane {one['id']!r} has an unknown field {min(unknown)!r}: expected "
                 f"{', '.join(Lane.__dataclass_fields__)}"
             )
-        centre = with_headings(np.array(one["centre"], float))
-        width = np.broadcast_to(np.asarray(one.get("width", 3.5), float), len(centre)).copy()
+        centre, width = _line(path, one)
         rest = {k: v for k, v in one.items() if k not in ("id", "centre", "width", "successors")}
         lanes.append(Lane(str(one["id"]), centre, width, tuple(map(str, one.get("successors", ()))), **rest))
     return tuple(lanes)
+
+
+def _line(path: str | Path, lane: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Centre line with headings and widths of a lane in a file."""
+    name = f"{path}: lane {lane['id']!r}"
+    try:
+        centre = np.array(lane["centre"], float)
+        good = centre.ndim == 2 and len(centre) >= 2 and centre.shape[1] in (2, 3) and np.isfinite(centre).all()
+    except (TypeError, ValueError):
+        good = False
+    if not good:
+        raise ValueError(f"{name}: centre = {lane['centre']!r}: expected two points [x, y] or more, of finite numbers")
+    try:
+        width = np.broadcast_to(np.asarray(lane.get("width", 3.5), float), len(centre)).copy()
+        good = bool((width > 0.0).all() and np.isfinite(width).all())
+    except (TypeError, ValueError):
+        good = False
+    if not good:
+        raise ValueError(f"{name}: width = {lane['width']!r}: expected a number > 0, or one for each point")
+    return with_headings(centre), width
 
 
 def with_headings(centre: np.ndarray) -> np.ndarray:

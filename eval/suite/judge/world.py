@@ -170,7 +170,7 @@ def _view(world, i: int, start: int, end: int, table: Table, slip) -> View:
         before[:, -1],
         before[:, :-1],
     )
-    return View(start, np.array(order[:-1]), log)
+    return View(start, np.array(order[:-1], int), log)  # of nobody, too
 
 
 def _box(trace: Trace, j: int, heading_bound: float, curvature: float) -> tuple[float, float, float, float]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rss_shield.eval.files import write_text
+from rss_shield.eval.files import folder_for, refuse, write_text
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.pictures import draw
 from rss_shield.eval.suite.scenarios.catalogue import SCENARIOS
@@ -204,15 +204,24 @@ def run(arguments: list[str] | None = None) -> None:
     parser.add_argument("--r157", type=Path, metavar="FOLDER", help="write only r157.md there: UN R157's situations")
     options = parser.parse_args(arguments)
     if options.r157 is not None:
-        write_r157(options.r157)
+        try:
+            write_r157(folder_for(options.r157, "--r157"))
+        except ValueError as error:
+            refuse("rss-shield scenarios", error)
         return
     chosen = [s for s in SCENARIOS if _is_asked(s.name, options.names)]
     crossings = [c for c in CROSSINGS if _is_asked(c.name, options.names)]
     count = len(SCENARIOS) + len(CROSSINGS)
     if not chosen and not crossings:
-        sys.exit(f"rss-shield scenarios: no name contains {', '.join(options.names)}; there are {count} scenarios")
+        refuse("rss-shield scenarios", f"no name contains {', '.join(options.names)}; there are {count} scenarios")
     if options.write is not None and len(chosen) + len(crossings) < count:
-        sys.exit("rss-shield scenarios: --write is for all scenarios: expected no names beside it")
+        refuse("rss-shield scenarios", "--write is for all scenarios: expected no names beside it")
+    try:
+        for option in ("write", "traces"):
+            if getattr(options, option) is not None:
+                folder_for(getattr(options, option), f"--{option}")
+    except ValueError as error:
+        refuse("rss-shield scenarios", error)
     outcomes = []
     for scenario in chosen:
         outcome = outcome_of(scenario)
@@ -228,7 +237,6 @@ def run(arguments: list[str] | None = None) -> None:
         said = "as derived" if not one.differences else "; ".join(one.differences)
         print(f"{crossing.name}: off {one.off.verdict or '-'}, on {one.on.verdict or '-'}: {said}")
         if options.traces is not None:
-            options.traces.mkdir(parents=True, exist_ok=True)
             for mode, result in (("off", one.off), ("on", one.on)):
                 save(result.trace, options.traces / f"{_stem(crossing.name)}_{mode}.npz")
     if options.write is not None:
