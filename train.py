@@ -27,6 +27,7 @@ import rss_shield
 from rss_shield.agents.blocks import available_devices, train_in_blocks
 from rss_shield.agents.learner import Learner, learner_of
 from rss_shield.agents.load import load_policy, policy_of
+from rss_shield.agents.own_reward import RewardFailed
 from rss_shield.agents.trackers import TRACKERS, check_tracker
 from rss_shield.command_line import NO_OVERRIDES, ConfigFile, Overrides, fail, parsed, shown
 from rss_shield.envs.arguments import rules_of
@@ -39,7 +40,7 @@ from rss_shield.eval import drivers, removal
 from rss_shield.eval.arms import FROM_OPTIONS, SHIELDED, Arm, arm_named, table
 from rss_shield.eval.config_option import HYPERPARAMETERS, Keys, split_arguments, with_values
 from rss_shield.eval.jobs import Job, run_jobs
-from rss_shield.eval.own import digests, driver_named, function_named, is_own
+from rss_shield.eval.own import OwnFailed, blaming, digests, driver_named, function_named, is_own
 from rss_shield.eval.replay import chosen, replay
 from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
 from rss_shield.eval.rollout import evaluate
@@ -455,7 +456,7 @@ def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, pr
         n_envs=config.n_envs,
         device=config.device,
         progress=progress,
-        reward=function_named(config.reward) if config.reward else None,
+        reward=blaming(function_named(config.reward), config.reward) if config.reward else None,
         tracker=config.tracker,
         watch=functools.partial(_remove, config, preset, row, total, path),
     )
@@ -684,7 +685,10 @@ def run(arguments: list[str]) -> None:
             "rss_shield.eval.rollout",
         ]
     )
-    main(arguments)
+    try:
+        main(arguments)
+    except (OwnFailed, RewardFailed) as error:
+        fail(PROGRAM, str(error))
 
 
 if __name__ == "__main__":
