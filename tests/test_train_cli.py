@@ -100,7 +100,8 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ),
         ("--config.lanes-count four", "config.lanes_count = 'four': expected a whole number >= 1"),
         ("--config.lanes-count 0", "config.lanes_count = 0: expected a whole number >= 1"),
-        ("--config.vehicles-density 0", "config.vehicles_density = 0: not possible in highway-fast-v0: Zero"),
+        ("--config.vehicles-density 0", "config.vehicles_density = 0: expected a number > 0"),
+        ("--config.duration -5", "config.duration = -5: expected a number > 0"),
         ("--config.initial-lane-id 9", "config.initial_lane_id = 9: not possible in highway-fast-v0: IndexError"),
         (
             "--config.observation.vehicle-count 8",
