@@ -61,4 +61,4 @@ def _quietly(call: Any, arguments: list[str]) -> None:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
             call(arguments)
     except SystemExit:
-        raise ValueError(said.getvalue().strip().removeprefix("train.py: error: ")) from None
+        raise ValueError(said.getvalue().strip().removeprefix(f"{train.PROGRAM}: error: ")) from None
