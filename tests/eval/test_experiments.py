@@ -163,6 +163,12 @@ def test_yaml_toml_and_json_say_the_same(tmp_path, name, text):
     assert experiment.name == "e" and experiment.grid == {"rules.memory": (True, False)}
 
 
+def test_a_key_is_there_once(tmp_path):
+    (tmp_path / "twice.yaml").write_text("policies: [idle]\nseeds: [0]\nseeds: [1]\n")
+    with pytest.raises(ValueError, match=r"twice\.yaml.*the key 'seeds' is there twice"):
+        read_experiment(tmp_path / "twice.yaml")
+
+
 def test_an_error_names_the_file(tmp_path):
     (tmp_path / "bad.yaml").write_text("policys: [idle]\n")
     with pytest.raises(ValueError, match=r"bad\.yaml: the experiment has an unknown key 'policys'"):
