@@ -21,6 +21,7 @@ help:            ## list the targets
 	@echo
 	@echo "  PYTHON=$(PYTHON) makes the environment; ARGS='--total-timesteps 1000000' goes to train.py;"
 	@echo "  ENVS='highway-fast-v0 intersection-v0' are the environments of compare;"
+	@echo "  a small one: make compare ENVS=highway-fast-v0 ARGS='--total-timesteps 20000 --seeds 0 --eval-episodes 100';"
 	@echo "  PLAN=short or full is how much of the campaign paper runs, DIVIDE=1000 tries all of it in minutes."
 
 compare: $(ENVS:%=compare-%)  ## train and compare shielded with unshielded PPO (minutes)

@@ -7,6 +7,7 @@ if __name__ == "__main__":  # before all that takes its time
 
 import functools
 import hashlib
+import itertools
 import math
 import multiprocessing
 import os
@@ -27,6 +28,7 @@ import rss_shield
 from rss_shield.agents.blocks import available_devices, train_in_blocks
 from rss_shield.agents.learner import Learner, learner_of
 from rss_shield.agents.load import load_policy, policy_of
+from rss_shield.agents.own_reward import RewardFailed
 from rss_shield.agents.trackers import TRACKERS, check_tracker
 from rss_shield.command_line import NO_OVERRIDES, ConfigFile, Overrides, fail, parsed, shown
 from rss_shield.envs.arguments import rules_of
@@ -39,7 +41,7 @@ from rss_shield.eval import drivers, removal
 from rss_shield.eval.arms import FROM_OPTIONS, SHIELDED, Arm, arm_named, table
 from rss_shield.eval.config_option import HYPERPARAMETERS, Keys, split_arguments, with_values
 from rss_shield.eval.jobs import Job, run_jobs
-from rss_shield.eval.own import digests, driver_named, function_named, is_own
+from rss_shield.eval.own import OwnFailed, blaming, digests, driver_named, function_named, is_own
 from rss_shield.eval.replay import chosen, replay
 from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
 from rss_shield.eval.rollout import evaluate
@@ -52,7 +54,7 @@ from rss_shield.shield.junctions.plans import INTENTS
 from rss_shield.shield.params import PRESETS, Preset, Rules, with_parameters
 
 TEST_ENVS = {"fast": 256, "highway-env": 1}  # side by side in testing; the engine is the faster, the more there are
-PROGRAM = "train.py"
+PROGRAM = "train.py" if __name__ == "__main__" else "rss-shield train"  # as it was called
 HELP = """Train agents with and without the RSS shield, test each with and without it, report who crashes.
 
 One table at the end: arms x shield {off, on} in testing; by default the arms are PPO with the shield {off, on} in
@@ -90,6 +92,7 @@ examples:
 """
 Progress = Callable[[int], None]
 NAMES = "letters, digits and . , = + - _"
+SEEDS = "different whole numbers, 0 to 2**32 - 1, at least one"
 LONGEST_NAME = 120
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
 FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
@@ -194,6 +197,8 @@ class Config:
     resume: bool = False
     """Go on with the run in the folder, with the options it was started with; nothing that is finished is
     repeated. Options that are given as well must be the same."""
+    resume_or_start: bool = False
+    """As --resume; where there is no run yet, it is started."""
     overwrite: bool = False
     """Throw the run in the folder away and start anew."""
 
@@ -210,7 +215,7 @@ def main(arguments: list[str]) -> None:
     except (ValueError, OSError) as error:
         fail(PROGRAM, str(error))
     for warning in warnings:
-        print(f"train.py: warning: {warning}", file=sys.stderr)
+        print(f"{PROGRAM}: warning: {warning}", file=sys.stderr)
 
     models = [(arm, seed) for seed in config.seeds for arm in config.arms if not arm_named(arm).scripted]
     cells = [cell for seed in config.seeds for arm in config.arms for cell in cells_of(config, arm_named(arm), seed)]
@@ -260,6 +265,9 @@ def started(arguments: list[str]) -> tuple[Config, Path]:
     options, altered = split_arguments(options, HYPERPARAMETERS)
     config = parse(options, Config())
     check(config)
+    asked = config.resume
+    options += ["--resume"] * (config.resume_or_start and not asked)
+    config = replace(config, resume=asked or config.resume_or_start)
     before = recorded(config.runs_dir / config.name) if config.resume and config.name else None
     if before is None:
         config = complete(config, values, altered)
@@ -267,8 +275,10 @@ def started(arguments: list[str]) -> tuple[Config, Path]:
         before = recorded(config.runs_dir / config.name) if config.resume else None
     folder = config.runs_dir / config.name
     if before is None:
-        if config.resume:
-            print(f"train.py: nothing to resume in {folder}: a new run is started there", file=sys.stderr)
+        if asked and not config.resume_or_start and not folder.exists():
+            raise ValueError(
+                f"--resume: there is no run in {folder}; --name names another, --resume-or-start starts one there"
+            )
         return replace(config, preset=preset_name(config)), folder
     stored = stored_config(before)
     config = parse(options, stored)
@@ -457,7 +467,7 @@ def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, pr
         n_envs=config.n_envs,
         device=config.device,
         progress=progress,
-        reward=function_named(config.reward) if config.reward else None,
+        reward=blaming(function_named(config.reward), config.reward) if config.reward else None,
         tracker=config.tracker,
         watch=functools.partial(_remove, config, preset, row, total, path),
     )
@@ -546,7 +556,18 @@ def _show(config: Config, preset: Preset, folder: Path, arm: str, progress: Prog
 
 def parse(arguments: list[str], default: Config) -> Config:
     """Read the command line. What cannot be read ends in one line and exit code 2."""
+    check_seeds(arguments)
     return parsed(Config, PROGRAM, HELP, arguments, default)
+
+
+def check_seeds(arguments: list[str]) -> None:
+    """Whole numbers come after --seeds: the reader of the command line would not say which."""
+    if "--seeds" not in arguments:
+        return
+    after = arguments[arguments.index("--seeds") + 1 :]
+    seeds = list(itertools.takewhile(lambda word: not word.startswith("--"), after))
+    if not seeds or not all(seed.lstrip("-").isdecimal() for seed in seeds if seed != "-h"):
+        fail(PROGRAM, f"--seeds {shown(seeds)} is out of range: expected {SEEDS}")
 
 
 def check(config: Config) -> None:
@@ -558,7 +579,7 @@ def check(config: Config) -> None:
         Options(**wrapped(config))
     except ValueError as error:
         fail(PROGRAM, str(error))
-    devices = available_devices()
+    devices, resumes = available_devices(), config.resume or config.resume_or_start
     looked_up: list[tuple[str, Callable[[str], Any], str]] = [("--arms", arm_named, arm) for arm in config.arms]
     looked_up += [("--arms", function_named, arm) for arm in config.arms if is_own(arm)]
     looked_up += [("--reward", function_named, config.reward)] * bool(config.reward)
@@ -573,7 +594,7 @@ def check(config: Config) -> None:
         ("arms", is_set_of(config.arms, config.arms), "one or more different names"),
         ("preset", is_file(config.preset) or config.preset in ("auto", *PRESETS), f"one of auto, {KNOWN_PRESETS}"),
         ("total_timesteps", config.total_timesteps >= 1, "at least 1"),
-        ("seeds", is_set_of(config.seeds, range(2**32)), "different whole numbers, 0 to 2**32 - 1"),
+        ("seeds", is_set_of(config.seeds, range(2**32)), SEEDS),
         ("entry", config.entry in ENTRIES, f"one of {', '.join(ENTRIES)}"),
         ("intent", config.intent in INTENTS, f"one of {', '.join(INTENTS)}"),
         ("waiting", config.waiting in WAITING, f"one of {', '.join(WAITING)}"),
@@ -591,7 +612,11 @@ def check(config: Config) -> None:
         ("tracker", config.tracker in TRACKERS, f"one of {', '.join(TRACKERS)}"),
         ("device", config.device in devices, f"one of {', '.join(devices)} on this machine"),
         ("name", config.name in ("", valid_name(config.name)), f"{NAMES}, such as {valid_name(config.name)}"),
-        ("resume", not (config.resume and config.overwrite), "--resume or --overwrite, not both"),
+        (
+            "resume",
+            not (resumes and config.overwrite),
+            "--resume or --overwrite, not both",
+        ),
     ):
         if not good:
             value = shown(getattr(config, option))
@@ -668,7 +693,7 @@ def valid_name(text: str) -> str:
     return name
 
 
-_NOT_RECORDED = ("list_arms", "workers", "tracker", "name", "runs_dir", "resume", "overwrite")
+_NOT_RECORDED = ("list_arms", "workers", "tracker", "name", "runs_dir", "resume", "resume_or_start", "overwrite")
 
 
 def run(arguments: list[str]) -> None:
@@ -684,7 +709,10 @@ def run(arguments: list[str]) -> None:
             "rss_shield.eval.rollout",
         ]
     )
-    main(arguments)
+    try:
+        main(arguments)
+    except (OwnFailed, RewardFailed) as error:
+        fail(PROGRAM, str(error))
 
 
 if __name__ == "__main__":

@@ -1,9 +1,15 @@
 """A reward of one's own: what it is made of, and how an agent is paid by it."""
 
 from collections.abc import Callable
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
+
+
+class RewardFailed(ValueError):
+    """A reward of a user's own is none; the message is one line."""
+
 
 Told = Callable[..., np.ndarray]
 
@@ -41,7 +47,12 @@ def told_by(infos: dict, ended: np.ndarray) -> Told:
 
 
 def _under(infos: Any, keys: tuple[str, ...]) -> Any:
-    for key in keys:
+    for depth, key in enumerate(keys):
+        known = [str(name) for name in infos if not str(name).startswith("_")] if isinstance(infos, dict) else []
+        if not isinstance(infos, dict) or key not in infos:
+            asked = ", ".join(map(repr, keys[: depth + 1]))
+            nearest = "".join(f"; the nearest is {name!r}" for name in get_close_matches(str(key), known, 1, 0.0))
+            raise KeyError(f"told({asked}): expected one of {', '.join(sorted(known)) or 'no more keys'}{nearest}")
         infos = infos[key]
     return infos
 
@@ -56,14 +67,14 @@ def rewards_by(
       rewards: `[E]`, of the environment, a penalty taken off.
 
     Raises:
-      ValueError: the function does not answer with one finite number for each environment.
+      RewardFailed: the function does not answer with one finite number for each environment.
     """
     told = told_by(infos, ended)
     raw = np.asarray(told("raw_reward"), float)
     paid = np.asarray(function(Decision(raw, np.asarray(actions), ended, told)), float)
     name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', function)}"
     if paid.shape != raw.shape:
-        raise ValueError(f"reward {name}: shape {paid.shape} for {len(raw)} environments; expected {raw.shape}")
+        raise RewardFailed(f"reward {name}: shape {paid.shape} for {len(raw)} environments; expected {raw.shape}")
     if not np.isfinite(paid).all():
-        raise ValueError(f"reward {name}: {paid[~np.isfinite(paid)][0]}; expected finite numbers")
+        raise RewardFailed(f"reward {name}: {paid[~np.isfinite(paid)][0]}; expected finite numbers")
     return paid - (raw - rewards)

@@ -89,7 +89,7 @@ def train(part: Part, runs: Path, divide: int, more: list[str]) -> None:
     options = ["--env-id", part.env_id, "--arms", *part.arms, "--seeds", *map(str, seeds)]
     options += ["--total-timesteps", str(max(part.decisions // divide, 1))]
     options += ["--eval-episodes", str(max(part.episodes // divide, 1))]
-    options += ["--runs-dir", str(runs), "--name", folder.name, "--resume", *more]
+    options += ["--runs-dir", str(runs), "--name", folder.name, "--resume-or-start", *more]
     call([str(ROOT / "train.py"), *options])
 
 

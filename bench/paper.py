@@ -60,7 +60,7 @@ def steps_of(arguments: argparse.Namespace) -> Iterator[Step]:
     yield Step("sweeps: page", ["-m", "rss_shield.eval.paper.sweeps", *swept, "--out", out])
     for env_id, decisions in COMPARED.items():
         words = ["train.py", "--env-id", env_id, "--total-timesteps", str(max(decisions // divide, 1))]
-        words += ["--runs-dir", str(runs), "--name", env_id, "--resume", *workers, *_small(divide, pages=True)]
+        words += ["--runs-dir", str(runs), "--name", env_id, "--resume-or-start", *workers, *_small(divide, pages=True)]
         yield Step(f"compare: {env_id}", words if divide == 1 else [*words, "--seeds", "0", "1"])
     compared = [str(runs / env_id) for env_id in COMPARED]
     yield Step("compare: page", ["-m", "rss_shield.eval.pages", *compared, "--out", out])

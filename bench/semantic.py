@@ -65,7 +65,7 @@ def run(env_id: str, config: Config) -> Path:
     fixed = ["--replay-episodes", "0", "--removal-checks", "0", "--workers", "1", "--no-pages"]
     words = ["--env-id", env_id, "--arms", *config.arms, "--seeds", *map(str, config.seeds)]
     words += [word for name, value in numbers.items() for word in (name, str(value))]
-    train.main([*words, *fixed, "--runs-dir", str(config.out), "--name", env_id, "--resume"])
+    train.main([*words, *fixed, "--runs-dir", str(config.out), "--name", env_id, "--resume-or-start"])
     return config.out / env_id
 
 

@@ -37,6 +37,8 @@ TYPES: dict[str, dict[str, type]] = {
     },
 }
 
+POSITIVE = ("config.vehicles_density", "config.duration")  # the road is built by the one, and ends by the other
+
 
 def default_config(env_id: str) -> dict[str, Any]:
     """The configuration of an environment that is not told otherwise.
@@ -123,6 +125,8 @@ def _check_value(name: str, value: Any, default: Any) -> None:
         return
     if not good:
         raise ValueError(f"{name} = {value!r}: expected {expected}, such as {default!r}")
+    if name in POSITIVE and value <= 0:
+        raise ValueError(f"{name} = {value!r}: expected a number > 0")
 
 
 def _is_number(value: Any) -> bool:

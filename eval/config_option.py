@@ -17,6 +17,17 @@ FILES = (".json", ".toml", ".yaml", ".yml")  # how the names of what can be read
 Keys = tuple[str, ...]  # of a nested value: ("observation", "type")
 
 
+class _Once(yaml.SafeLoader):
+    """Refuses a key that is there twice: YAML would take the last without a word."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        keys = [key.value for key, _ in node.value if key.value != "<<" and isinstance(key, yaml.ScalarNode)]
+        twice = [key for key in keys if keys.count(key) > 1]
+        if twice:
+            raise ValueError(f"the key {twice[0]!r} is there twice (line {node.start_mark.line + 1} on)")
+        return super().construct_mapping(node, deep)
+
+
 def read_config(text: str) -> dict[str, Any]:
     """A configuration from a file, or from JSON itself.
 
@@ -47,7 +58,7 @@ def _parsed(content: str, kind: str, source: str) -> Any:
             return json.loads(content)
         if kind == "toml":
             return tomllib.loads(content)
-        return yaml.safe_load(content)
+        return yaml.load(content, _Once)
     except (ValueError, yaml.YAMLError) as error:
         raise ValueError(f"{source} cannot be read: {' '.join(str(error).split())}") from None
 

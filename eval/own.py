@@ -5,6 +5,7 @@ import hashlib
 import importlib
 import os
 import sys
+import traceback
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,11 @@ from typing import Any
 import numpy as np
 
 from rss_shield.eval.config_option import FILES
+
+
+class OwnFailed(ValueError):
+    """A function of a user's own raised something, or answered with what is no answer; the message is one line."""
+
 
 Driver = Callable[[np.ndarray], np.ndarray]
 
@@ -31,6 +37,8 @@ def function_named(name: str) -> Callable[..., Any]:
       ValueError: there is no such module or function, or the module fails when it is imported; the message says which.
     """
     module, _, function = name.partition(":")
+    if not (module and function):
+        raise ValueError(f"{name!r}: expected module:function")
     here = os.getcwd()
     if here not in sys.path:
         sys.path.insert(0, here)  # and it stays there, for what the module imports later
@@ -51,6 +59,28 @@ def function_named(name: str) -> Callable[..., Any]:
     return found
 
 
+def blaming(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+    """The same function; what it raises is an `OwnFailed` that names it and the line of its file."""
+
+    @functools.wraps(function)
+    def called(*args: Any) -> Any:
+        try:
+            return function(*args)
+        except Exception as error:
+            text = error.args[0] if isinstance(error, KeyError) and error.args else error
+            where = _line_of(function, error)
+            raise OwnFailed(" ".join(f"{name}: {type(error).__name__}: {text}{where}".split())) from error
+
+    return called
+
+
+def _line_of(function: Callable[..., Any], error: Exception) -> str:
+    """Where in the function's own file an error came up, at its deepest."""
+    file = getattr(getattr(function, "__code__", None), "co_filename", None)
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    return f" ({frames[-1].filename}, line {frames[-1].lineno}: {frames[-1].line})" if frames else ""
+
+
 def driver_named(name: str, one_by_one: bool = False) -> Driver:
     """A policy: observations `[B, ...]` -> actions `[B]`.
 
@@ -61,7 +91,7 @@ def driver_named(name: str, one_by_one: bool = False) -> Driver:
     Raises:
       ValueError: as `function_named`; when it drives, if it does not answer with one action for each observation.
     """
-    return functools.partial(_checked, function_named(name), name, one_by_one)
+    return functools.partial(_checked, blaming(function_named(name), name), name, one_by_one)
 
 
 def _checked(function: Callable[..., Any], name: str, one_by_one: bool, observations: np.ndarray) -> np.ndarray:
@@ -70,7 +100,7 @@ def _checked(function: Callable[..., Any], name: str, one_by_one: bool, observat
         return np.array([function(observation) for observation in observations])
     actions = np.asarray(function(observations))
     if actions.ndim == 0 or len(actions) != len(observations):
-        raise ValueError(
+        raise OwnFailed(
             f"{name}: returned an array of shape {actions.shape} for {len(observations)} observations; expected one "
             "action for each; `rss-shield test --one-by-one` takes functions of one observation"
         )

@@ -59,7 +59,7 @@ def train_words(file: str, experiment: "Experiment", env_id: str) -> list[str]:
         words = training_words(env_id, experiment.arms, experiment.seeds, experiment.tests, experiment.options)
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from None
-    return ["--name", run_folder(experiment, env_id), "--resume", *words]
+    return ["--name", run_folder(experiment, env_id), "--resume-or-start", *words]
 
 
 def existing(file: str, experiment: "Experiment", runs_dir: Path) -> list[Path]:

@@ -26,10 +26,10 @@ def file(tmp_path):
 def test_an_experiment_is_one_training_run_per_road(file):
     first, second = expanded("train", [file, "--workers", "1"])
     assert " ".join(first) == (
-        "--name two-roads-highway-fast-v0 --resume --env-id highway-fast-v0 --arms shielded lazy --seeds 0 3 "
+        "--name two-roads-highway-fast-v0 --resume-or-start --env-id highway-fast-v0 --arms shielded lazy --seeds 0 3 "
         "--eval-episodes 40 --total-timesteps 500 --risk --rules.memory False --config.lanes-count 2 --workers 1"
     )
-    assert second[:5] == ["--name", "two-roads-merge-v0", "--resume", "--env-id", "merge-v0"]
+    assert second[:5] == ["--name", "two-roads-merge-v0", "--resume-or-start", "--env-id", "merge-v0"]
     config, folder = train.started(first)
     assert config.risk and not config.rules.memory and config.config == {"lanes_count": 2}
     assert folder.name == "two-roads-highway-fast-v0"

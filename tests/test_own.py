@@ -17,7 +17,7 @@ from rss_shield.agents.blocks import train_in_blocks
 from rss_shield.agents.own_reward import rewards_by
 from rss_shield.agents.vec_env import VectorEnvAdapter
 from rss_shield.eval.arms import arm_called, arm_named
-from rss_shield.eval.own import digests, driver_named, function_named, is_own
+from rss_shield.eval.own import OwnFailed, blaming, digests, driver_named, function_named, is_own
 from rss_shield.eval.plots import style_of
 from rss_shield.eval.report import cell_path
 from rss_shield.eval.runs.experiment import experiment_of
@@ -63,6 +63,7 @@ def in_a_folder_of_its_own(tmp_path, monkeypatch):
     ("name", "message"),
     [
         ("not_there:drive", "no module 'not_there' in"),
+        ("brought", "'brought': expected module:function"),
         ("brought:none", "module 'brought' has no 'none'"),
         ("brought:number", "int cannot be called"),
         ("fails:drive", "fails cannot be imported: ZeroDivisionError: division by zero"),
@@ -73,7 +74,7 @@ def test_what_cannot_be_looked_up_is_said_in_one_line(name, message, capsys):
     with pytest.raises(ValueError, match=name) as error:
         function_named(name)
     assert message in str(error.value)
-    for option in (["--arms", "lazy", name], ["--reward", name]):
+    for option in (["--arms", "lazy", name], ["--reward", name])[":" not in name :]:
         with pytest.raises(SystemExit):
             train.started(option)
         assert message in capsys.readouterr().err
@@ -84,6 +85,20 @@ def test_a_policy_answers_with_one_action_for_each_observation():
     assert driver_named("brought:drive")(seen).tolist() == driver_named("brought:one", True)(seen).tolist() == [3] * 4
     with pytest.raises(ValueError, match=r"shape \(\) for 4 observations"):
         driver_named("brought:one")(seen)
+
+
+def test_what_an_own_function_raises_names_it_and_its_line(tmp_path, monkeypatch, capsys):
+    (tmp_path / "raising.py").write_text("def drive(seen):\n    return sped\n\n\ndef paid(d):\n    d.told('sped')\n")
+    with pytest.raises(OwnFailed, match=r"raising:drive: NameError: .*raising.py, line 2: return sped"):
+        driver_named("raising:drive")(np.zeros((2, 5)))
+    function = blaming(function_named("raising:paid"), "raising:paid")
+    infos = {"raw_reward": np.ones(2), "speed": np.ones(2)}
+    with pytest.raises(OwnFailed, match=r"raising:paid: KeyError: told\('sped'\): .*; the nearest is 'speed' \("):
+        rewards_by(function, np.ones(2), np.zeros(2), infos, np.zeros(2, bool))
+    monkeypatch.setattr(train, "main", driver_named("raising:drive"))
+    with pytest.raises(SystemExit) as stop:
+        train.run([])
+    assert stop.value.code == 2 and len(capsys.readouterr().err.splitlines()) == 1
 
 
 def test_a_policy_of_ones_own_is_an_arm():

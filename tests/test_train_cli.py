@@ -17,6 +17,7 @@ from PIL import Image
 from places import ROOT
 from stable_baselines3 import PPO
 
+from rss_shield import train
 from rss_shield.eval.metrics import METRICS, with_outcomes
 from rss_shield.shield.params import RSSParams
 
@@ -100,7 +101,8 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ),
         ("--config.lanes-count four", "config.lanes_count = 'four': expected a whole number >= 1"),
         ("--config.lanes-count 0", "config.lanes_count = 0: expected a whole number >= 1"),
-        ("--config.vehicles-density 0", "config.vehicles_density = 0: not possible in highway-fast-v0: Zero"),
+        ("--config.vehicles-density 0", "config.vehicles_density = 0: expected a number > 0"),
+        ("--config.duration -5", "config.duration = -5: expected a number > 0"),
         ("--config.initial-lane-id 9", "config.initial_lane_id = 9: not possible in highway-fast-v0: IndexError"),
         (
             "--config.observation.vehicle-count 8",
@@ -314,7 +316,7 @@ def test_a_run_killed_thrice_and_resumed_gives_the_same_episodes(finished, tmp_p
     milestones = (folder / "unshielded-seed0" / "model.zip", folder / "episodes" / cell, folder / "replays" / cell)
     kept = {}
     for milestone in milestones:
-        process = start(tmp_path, "--name", "killed", "--resume")
+        process = start(tmp_path, "--name", "killed", "--resume-or-start")
         while not milestone.exists():
             assert process.poll() is None, process.stdout.read()
             time.sleep(0.02)
@@ -390,7 +392,7 @@ MILESTONES = {
 )
 def test_two_interrupts_at_once_end_a_run_within_seconds_and_it_can_be_resumed(milestone, workers, tmp_path):
     runs, folder = tmp_path / "runs", tmp_path / "runs" / "stopped"
-    small = ["--name", "stopped", "--resume", "--workers", str(workers), "--runs-dir", str(runs)]
+    small = ["--name", "stopped", "--resume-or-start", "--workers", str(workers), "--runs-dir", str(runs)]
     options = ["--total-timesteps", "200000" if milestone == "in training" else "64", "--eval-episodes"]
     options += ["100000" if milestone == "in testing" else "3"]
     command = [sys.executable, str(SCRIPT), *TINY, *small, *options]
@@ -424,11 +426,23 @@ def test_two_interrupts_at_once_end_a_run_within_seconds_and_it_can_be_resumed(m
         assert {path: path.stat().st_mtime_ns for path in finished} == finished
 
 
-def test_to_resume_nothing_is_said(tmp_path, monkeypatch, capsys):
+def test_to_resume_nothing_is_refused_unless_it_may_start(tmp_path, monkeypatch, capsys):
+    there = ["--name", "never", "--runs-dir", str(tmp_path)]
+    with pytest.raises(SystemExit) as stop:
+        call(monkeypatch, "--resume", *there)
+    assert stop.value.code == 2 and not list(tmp_path.iterdir())
+    said = capsys.readouterr().err.strip()
+    assert said.startswith(f"train.py: error: --resume: there is no run in {tmp_path / 'never'};")
+    config, _ = train.started(["--resume-or-start", *there])
+    assert config.resume and not capsys.readouterr().err
+
+
+@pytest.mark.parametrize("seeds", ["", "a", "0 1.5"])
+def test_seeds_that_are_none_are_refused_by_the_command_that_was_called(seeds, capsys):
     with pytest.raises(SystemExit):
-        call(monkeypatch, "--resume", "--name", "never", "--runs-dir", str(tmp_path), "--config.lanes-count", "0")
-    call(monkeypatch, *TINY, "--arms", "shielded", "--resume", "--name", "new", "--runs-dir", str(tmp_path))
-    assert f"nothing to resume in {tmp_path / 'new'}: a new run is started there" in capsys.readouterr().err
+        train.started(["--seeds", *seeds.split(), "--n-envs", "2"])
+    expected = "is out of range: expected different whole numbers, 0 to 2**32 - 1, at least one"
+    assert capsys.readouterr().err == f"rss-shield train: error: {f'--seeds {seeds}'.strip()} {expected}\n"
 
 
 NAMED = [

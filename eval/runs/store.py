@@ -5,10 +5,12 @@ import os
 import shutil
 from pathlib import Path
 
-from rss_shield.eval.files import write_json
+from rss_shield.eval.files import write_json, write_text
 from rss_shield.eval.runs.tasks import Task
 
 Files = dict[str, bytes]  # name -> content
+TASK = "task.json"
+ERROR = "error.txt"  # in the folder of a task that failed: its traceback
 
 
 class Store:
@@ -22,7 +24,7 @@ class Store:
         return self.folder / task.key
 
     def has(self, task: Task) -> bool:
-        return self.path(task).is_dir()
+        return (self.path(task) / TASK).is_file()
 
     def put(self, task: Task, files: Files) -> None:
         """Keep the files of a task. A kill leaves all of them or none."""
@@ -31,10 +33,16 @@ class Store:
         temporary = self.folder / f".{task.key}.{os.getpid()}.tmp"
         shutil.rmtree(temporary, ignore_errors=True)
         temporary.mkdir()
-        write_json(temporary / "task.json", task.config)
+        write_json(temporary / TASK, task.config)
         for name, content in files.items():
             (temporary / name).write_bytes(content)
+        shutil.rmtree(self.path(task), ignore_errors=True)  # it may have failed before
         os.rename(temporary, self.path(task))
 
+    def fail(self, task: Task, error: str) -> None:
+        """Keep what a task failed of; it is still to be done."""
+        self.path(task).mkdir(exist_ok=True)
+        write_text(self.path(task) / ERROR, error)
+
     def config(self, task: Task) -> dict:
-        return json.loads((self.path(task) / "task.json").read_text(encoding="utf-8"))
+        return json.loads((self.path(task) / TASK).read_text(encoding="utf-8"))

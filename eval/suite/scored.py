@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv, VectorWrapper
 
 from rss_shield.agents.own_reward import Reward, rewards_by
-from rss_shield.eval.own import function_named
+from rss_shield.eval.own import blaming, function_named
 
 COLUMN = "own_return"
 
@@ -43,7 +43,7 @@ def scored(make_vec: Callable[[int], Any], name: str) -> Callable[[int], Any]:
     """
     if not name:
         return make_vec
-    function = function_named(name)
+    function = blaming(function_named(name), name)
     return lambda n_envs: Scored(make_vec(n_envs), function)
 
 

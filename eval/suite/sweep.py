@@ -25,12 +25,14 @@ from rss_shield.eval.run_folder import versions
 from rss_shield.eval.runs.backends import Outcome, Work, run_tasks
 from rss_shield.eval.runs.experiment import Experiment, read_experiment
 from rss_shield.eval.runs.points import metric_named, point_row
-from rss_shield.eval.runs.store import Files, Store
+from rss_shield.eval.runs.store import ERROR, Files, Store
 from rss_shield.eval.runs.tables import write_points
 from rss_shield.eval.runs.tasks import Task, samples_of, tasks_of
 from rss_shield.eval.suite.policies import check_policy
-from rss_shield.eval.suite.scripted import scripted_task
-from rss_shield.eval.suite.setup import setup_of
+from rss_shield.eval.suite.scripted import check_environment, check_played, scripted_task
+
+MOST_WORKERS = 256
+ROLES = ("environment", "arm", "policy")
 
 
 @dataclass(frozen=True)
@@ -95,9 +97,19 @@ class Sweep:
             for outcome in run_tasks(missing, self.work, **self.run_options):
                 if outcome.files is None:
                     self.failed.append(outcome)
+                    self.store.fail(outcome.task, outcome.error)
                 else:
                     self.store.put(outcome.task, outcome.files)
                 bar.update()
+
+    def why(self, outcome: Outcome) -> str:
+        """One line: which task failed, of what, and where more is said."""
+        config = outcome.task.config
+        player = config["arm"] if "arm" in config else config["policy"]
+        what = [str(config["environment"]), str(player), f"seed {config['seed']}"]
+        setting = [f"{name} = {value}" for name, value in outcome.task.point.items() if name not in ROLES]
+        path, last = self.store.path(outcome.task) / ERROR, outcome.error.strip().splitlines()[-1]
+        return f"task {', '.join([*what, *setting])} failed: {last} (all of it: {path})"
 
     def _ask_optuna(self) -> None:
         """Let Optuna's TPE choose, a batch at a time. Asked again, it chooses the same, so nothing is run twice."""
@@ -164,6 +176,8 @@ def _suggest(trial: Any, name: str, space: Any) -> Any:
 
 def check_tasks(tasks: list[Task]) -> None:
     """Refuse bad options before anything runs."""
+    for environment in dict.fromkeys(task.config["environment"] for task in tasks):
+        check_environment(environment)
     for task in {to_json({**task.config, "seed": 0}): task for task in tasks}.values():
         if "arm" in task.config:
             from rss_shield.eval.suite.trained import check_trained
@@ -171,7 +185,7 @@ def check_tasks(tasks: list[Task]) -> None:
             check_trained(task.config)
         else:
             check_policy(task.config["policy"])
-            setup_of(task.config["environment"], task.config["options"])
+            check_played(task.config["environment"], task.config["policy"], task.config["options"])
 
 
 def sweep(experiment: Experiment, folder: Path, work: Work = do_task, file: str = "", **run: Any) -> Sweep:
@@ -212,6 +226,17 @@ def with_episodes(experiment: Experiment, episodes: int | None) -> Experiment:
     return replace(experiment, tests={**experiment.tests, "episodes": episodes})
 
 
+def checked_workers(workers: int) -> int:
+    """A number of workers.
+
+    Raises:
+      ValueError: out of range.
+    """
+    if not 1 <= workers <= MOST_WORKERS:
+        raise ValueError(f"--workers {workers} is out of range: expected 1 to {MOST_WORKERS}")
+    return workers
+
+
 def _record(experiment: Experiment, folder: Path, file: str) -> list[str]:
     """Write the experiment and the versions beside its results; says what changed since the first task."""
     path, now = folder / "experiment.json", json.loads(to_json(versions()))
@@ -235,14 +260,15 @@ def run(arguments: list[str]) -> None:
             given.runs_dir / experiment.name,
             file=str(given.experiment),
             backend=given.backend,
-            workers=given.workers,
+            workers=checked_workers(given.workers),
             address=given.address,
         )
     except (ValueError, OSError) as error:
         print(f"rss-shield sweep: error: {' '.join(plainly(error).split())}", file=sys.stderr)
         raise SystemExit(2) from None
-    print(f"\nEverything is in {done.folder}: table.md, points.csv, pareto.png, tasks/")
+    if not done.failed:
+        print(f"\nEverything is in {done.folder}: table.md, points.csv, pareto.png, tasks/")
+        return
     for outcome in done.failed:
-        print(f"task {outcome.task.key} {outcome.task.config} failed:\n{outcome.error}", file=sys.stderr)
-    if done.failed:
-        raise SystemExit(1)
+        print(f"rss-shield sweep: {done.why(outcome)}", file=sys.stderr)
+    raise SystemExit(1)

@@ -30,7 +30,17 @@ def trained_task(config: dict[str, Any]) -> Files:
 
 def check_trained(config: dict[str, Any]) -> None:
     """Refuse what training would refuse, before anything runs."""
-    _quietly(train.started, arguments_of(config))
+    _quietly(_tried, arguments_of(config))
+
+
+def _tried(arguments: list[str]) -> None:
+    options, _ = train.started(arguments)
+    try:
+        train.tried(options, train.resolve(options))
+    except ValueError:
+        raise
+    except Exception as error:
+        raise ValueError(f"{type(error).__name__}: {error} ({options.env_id})") from error
 
 
 def arguments_of(config: dict[str, Any]) -> list[str]:
@@ -51,4 +61,4 @@ def _quietly(call: Any, arguments: list[str]) -> None:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
             call(arguments)
     except SystemExit:
-        raise ValueError(said.getvalue().strip().removeprefix("train.py: error: ")) from None
+        raise ValueError(said.getvalue().strip().removeprefix(f"{train.PROGRAM}: error: ")) from None

@@ -102,6 +102,48 @@ def test_options_are_refused_before_anything_runs(options, message):
     assert message in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"environments": ["highway-fat-v0"]}, "no environment 'highway-fat-v0'; the nearest is 'highway-fast-v0'"),
+        ({"options": {"traffic": "compliant"}}, "expected backend = 'highway-env'"),
+        ({"policies": ["continuous"]}, "policy = 'continuous': not for the actions Discrete(5)"),
+        ({"policies": [], "arms": ["shielded"], "options": {"traffic": "compliant"}}, "expected backend = 'highway-e"),
+    ],
+)
+def test_what_no_task_could_begin_is_refused_before_any(changed, message):
+    with pytest.raises(ValueError) as error:
+        check_tasks(tasks_of(experiment_of(LEAST | changed)))
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize("workers", [0, -1, 257])
+def test_workers_are_refused_before_any_work(tmp_path, monkeypatch, capsys, workers):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "e.yaml").write_text("policies: [idle]\n")
+    with pytest.raises(SystemExit) as stop:
+        main(["sweep", "e.yaml", "--workers", str(workers)])
+    said = capsys.readouterr()
+    assert stop.value.code == 2 and not said.out
+    assert said.err == f"rss-shield sweep: error: --workers {workers} is out of range: expected 1 to 256\n"
+
+
+def test_a_task_that_fails_says_so_in_one_line_and_is_done_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "broken_driver.py").write_text("def drive(observations):\n    return sped\n")
+    (tmp_path / "e.yaml").write_text("policies: ['broken_driver:drive']\ntests: {episodes: 1}\n")
+    with pytest.raises(SystemExit) as stop:
+        main(["sweep", "e.yaml"])
+    said, (path,) = capsys.readouterr(), (tmp_path / "runs" / "e" / "tasks").glob("*/error.txt")
+    assert stop.value.code == 1 and "Everything is in" not in said.out
+    (line,) = [line for line in said.err.splitlines() if line.startswith("rss-shield sweep: ")]
+    assert "broken_driver:drive, seed 0 failed: " in line and "NameError: name 'sped' is not defined" in line
+    assert path.parent.name in line and "Traceback" in path.read_text()
+    with pytest.raises(SystemExit):
+        main(["sweep", "e.yaml"])  # what failed is not taken for done
+
+
 def test_an_option_is_set_once():
     sweep = {"list": {"a": {"rules.memory": False}}, "grid": {"rules.memory": [True]}}
     with pytest.raises(ValueError, match=r"rules.memory is in sweep.list and varied as well"):
@@ -133,6 +175,12 @@ def test_yaml_toml_and_json_say_the_same(tmp_path, name, text):
     (tmp_path / name).write_text(text)
     experiment = read_experiment(tmp_path / name)
     assert experiment.name == "e" and experiment.grid == {"rules.memory": (True, False)}
+
+
+def test_a_key_is_there_once(tmp_path):
+    (tmp_path / "twice.yaml").write_text("policies: [idle]\nseeds: [0]\nseeds: [1]\n")
+    with pytest.raises(ValueError, match=r"twice\.yaml.*the key 'seeds' is there twice"):
+        read_experiment(tmp_path / "twice.yaml")
 
 
 def test_an_error_names_the_file(tmp_path):
