@@ -81,6 +81,10 @@ def read_experiment(path: str | Path) -> Experiment:
 def experiment_of(given: Mapping[str, Any]) -> Experiment:
     """An experiment from the keys of its file."""
     check_names(given, _FILE, "the experiment")
+    if not isinstance(given.get("about", ""), str):
+        raise ValueError(f"about = {given['about']!r}: expected a text")
+    if "sweep" in given and not given["sweep"]:
+        raise ValueError(f"sweep = {given['sweep']!r}: expected {', '.join(_SWEEP)}, or no sweep at all")
     sweep, axes = _mapping(given, "sweep"), _mapping(given, "axes")
     check_names(sweep, _SWEEP, "sweep")
     check_names(axes, ("safety", "performance"), "axes")

@@ -64,6 +64,8 @@ def test_the_key_is_that_of_the_configuration_however_it_is_written():
         ({"tests": {"episodes": 0}}, "tests.episodes = 0: expected a whole number >= 1"),
         ({"arms": ["shielded"]}, "either arms"),
         ({"policies": []}, "either arms"),
+        ({"about": 3}, "about = 3: expected a text"),
+        ({"sweep": None}, "sweep = None: expected list, grid"),
         ({"seeds": [0, "1"]}, "seeds = '1': expected a whole number >= 0"),
         ({"seeds": [0, 0]}, "seeds = [0, 0]: something is named twice"),
         ({"environments": "merge-v0"}, "environments = 'merge-v0': expected a list"),
