@@ -80,6 +80,8 @@ def plot_learning_curve(curve: pd.DataFrame, folder: Path, title: str) -> None:
                     for low, high, inside in bins[arm]
                 ]
                 _line(axes, points, label, str(arm))
+            if not any(np.isfinite(line.get_ydata()).any() for line in axes.get_lines()):
+                axes.text(0.5, 0.5, "too few episodes have ended", transform=axes.transAxes, ha="center", color="0.4")
             label_over_training(axes, name, share=name != "Return per episode")
             if name.startswith("Frames"):  # often a percent or two, which from 0 to 100 % looks like nothing
                 axes.autoscale(axis="y")
@@ -137,7 +139,7 @@ def plot_blame(episodes: pd.DataFrame, folder: Path, title: str) -> None:
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.set_ylim(bottom=0)
         figure.legend(title="Who broke their duty", loc="outside lower center", ncols=len(BLAMES))
-        whiskers = "whiskers: 95 % Wilson intervals over episodes; left: ego or both, right: all"
+        whiskers = "whiskers: 95 % Wilson intervals over episodes; left one: the ego's share, right one: all crashes"
         figure.suptitle(f"{title}: who is to blame\n({whiskers})", size=8)
         save(figure, folder / "blame")
 
