@@ -32,10 +32,6 @@ class VectorEnvAdapter(VecEnv):
     Args:
       env: a vector environment with autoreset in the same step.
       charge: taken off the rewards; None = nothing.
-
-    Attributes:
-      reward: takes the place of the environment's rewards, before anything is charged; None = they stay. An episode's
-        return is then the sum of these.
     """
 
     autoreset_mode = AutoresetMode.SAME_STEP
@@ -46,6 +42,7 @@ class VectorEnvAdapter(VecEnv):
             raise ValueError(f"autoreset_mode = {mode}: expected {self.autoreset_mode}")
         self.env = env
         self.charge = charge
+        # takes the place of the environment's rewards, before anything is charged; an episode's return is their sum
         self.reward: Reward | None = None
         self.last_infos: dict = {}
         self.ended = np.zeros(env.num_envs, bool)  # by the last step

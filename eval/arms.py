@@ -171,7 +171,7 @@ OWN_COLOURS = ("#009988", "#EE3377", "#33BBEE", "#CC3311", "#0077BB", "#AA7744")
 
 
 def arm_named(name: str) -> Arm:
-    """An arm of the table, or a policy of one's own: "module:function" of observations `[B, ...]` to actions `[B]`.
+    """An arm of the table, or a policy of one's own, `module:function`: from many observations to as many actions.
 
     Raises:
       ValueError: there is none of this name; the message has the nearest.

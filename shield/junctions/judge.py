@@ -155,9 +155,10 @@ def _broken(sample, memory, other, dt, share):
 def _jump(sample, memory, dt):
     """How much farther than its wheels took it a road user has moved, or has turned its ends, in a frame [m]."""
     way = max(abs(sample.speed), abs(memory.speed)) * dt
-    moved = np.hypot(sample.x - memory.x, sample.y - memory.y)
-    turned = abs(wrap_angle(sample.heading - memory.heading)) * sample.half_length
-    return max(moved, turned) - way
+    dx, dy, turned = sample.x - memory.x, sample.y - memory.y, 0.0
+    if sample.heading != memory.heading:
+        turned = abs(wrap_angle(sample.heading - memory.heading)) * sample.half_length
+    return max(np.sqrt(dx * dx + dy * dy), turned) - way
 
 
 @inner
