@@ -54,7 +54,7 @@ class Arm(NamedTuple):
 
     @property
     def own(self) -> bool:
-        """A function of the user's, `module:function`."""
+        """Is it a function of the user's?"""
         return ":" in self.name
 
     @property
