@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal
 import pandas as pd
 import tyro
 
-from rss_shield.eval.files import plainly, to_json, write_json
+from rss_shield.eval.files import refuse, to_json, write_json
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.run_folder import versions
 from rss_shield.eval.runs.backends import Outcome, Work, run_tasks
@@ -264,8 +264,7 @@ def run(arguments: list[str]) -> None:
             address=given.address,
         )
     except (ValueError, OSError) as error:
-        print(f"rss-shield sweep: error: {' '.join(plainly(error).split())}", file=sys.stderr)
-        raise SystemExit(2) from None
+        refuse("rss-shield sweep", error)
     if not done.failed:
         print(f"\nEverything is in {done.folder}: table.md, points.csv, pareto.png, tasks/")
         return
