@@ -322,16 +322,15 @@ def run(first, last, sight, world, batch, inputs, outputs, film, watch, settings
             report_seats(e, cars, world, seats, told)
             inputs.todo[e] = DONE
             continue
+        place = Place(cars, episode, order, sight, distances, plans, ride, meter, aware)
         if inputs.todo[e] == RESTART or (inputs.todo[e] == DECIDE and autoreset == NEXT_STEP and episode.ended):
             _start_outputs(e, outputs)
-            place = Place(cars, episode, order, sight, distances, plans, ride, meter, aware)
             _restart(e, place, world, watch, step, observation, seats, told)
             report_risk(e, meter, outputs.risks)
             inputs.todo[e] = DONE
             continue
         if inputs.todo[e] == DECIDE:
             _start_outputs(e, outputs)
-            place = Place(cars, episode, order, sight, distances, plans, ride, meter, aware)
             cost = _advance(e, place, world, watch, settings, inputs, film, step, seats, told)
             _see(cars, episode, world, sight, observation, aware)
             reward = earn(e, cars, episode, inputs.actions[e], world, sight, step, seats, told)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rss_shield.envs.fast.boxes import boxes_of
 from rss_shield.envs.fast.contacts import check_contact
 from rss_shield.envs.fast.crossings import scene_of
 from rss_shield.envs.fast.drivers import note_change
@@ -25,14 +26,12 @@ from rss_shield.envs.fast.neighbours import (
 from rss_shield.envs.fast.risk import look_at_risk
 from rss_shield.envs.fast.senses import GHOSTS, follow, look, start_senses
 from rss_shield.envs.fast.sight import project
-from rss_shield.envs.fast.state import DIRECT, OBSTACLE_SIZE
-from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH
+from rss_shield.envs.fast.state import DIRECT
 from rss_shield.envs.roads.steering import MAX_SLIP, slip_at, steering_for
 from rss_shield.shield._numba.compiled import inner, part, rare
 from rss_shield.shield.comfort import ride_on, start_ride
 from rss_shield.shield.command import Command
 from rss_shield.shield.filters.answer import RSS, Traffic, answer
-from rss_shield.shield.geometry import box_of
 from rss_shield.shield.junctions.controller import junction_frame
 from rss_shield.shield.junctions.held_back import held_by
 from rss_shield.shield.junctions.memory import CROSSING
@@ -65,9 +64,7 @@ class Watch(NamedTuple):
 
 def make_watch(heading_bound, curvature=0.0):
     """Tables for a `heading_bound` as in `Rules`, and the tightest bend of the roads [1/m]."""
-    bounds = heading_bound, curvature
-    boxes = [box_of(CAR_LENGTH, CAR_WIDTH, *bounds), box_of(OBSTACLE_SIZE, OBSTACLE_SIZE, *bounds, driven=False)]
-    return Watch(np.array(boxes), np.zeros(1, MEMORY), np.zeros(1, CROSSING), MAX_SLIP)
+    return Watch(boxes_of(heading_bound, curvature), np.zeros(1, MEMORY), np.zeros(1, CROSSING), MAX_SLIP)
 
 
 # Of the next two one is None, or all three are, and numba leaves out of the kernel what it would need.

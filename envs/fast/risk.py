@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rss_shield.envs.fast.boxes import boxes_of
 from rss_shield.envs.fast.neighbours import car_of, row_before
-from rss_shield.envs.fast.state import META, OBSTACLE, OBSTACLE_SIZE
+from rss_shield.envs.fast.state import META, OBSTACLE
 from rss_shield.envs.options import CAR_MASS, Settings
 from rss_shield.envs.roads.lanes import tightest
 from rss_shield.envs.roads.lines import line_beside
-from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, heading_at, local_coordinates
+from rss_shield.envs.roads.network import heading_at, local_coordinates
 from rss_shield.shield._numba.compiled import inner, part
 from rss_shield.shield.geometry import (
     AFTER,
@@ -27,7 +28,6 @@ from rss_shield.shield.geometry import (
     SIN,
     X,
     Y,
-    box_of,
 )
 from rss_shield.shield.lanes.frame import to_lane_frame
 from rss_shield.shield.risk import KNOWN_SAFE, UNKNOWN, RiskSettings, neighbours, scene_risk, toward_leader
@@ -94,9 +94,8 @@ class Meter(NamedTuple):
 def compile_field(network, risk: RiskSettings, settings: Settings) -> Field:
     """What does not change on a `highway_env.road.road.RoadNetwork`."""
     eta = [[weight_of(line_beside(network, index, side), risk) for side in (-1, 1)] for index in network.lanes_dict()]
-    bounds = settings.table.rules.heading_bound, tightest(network)
-    boxes = [box_of(CAR_LENGTH, CAR_WIDTH, *bounds), box_of(OBSTACLE_SIZE, OBSTACLE_SIZE, *bounds, driven=False)]
-    return Field(risk, np.array(eta), np.array(boxes), settings.table.dt)
+    boxes = boxes_of(settings.table.rules.heading_bound, tightest(network))
+    return Field(risk, np.array(eta), boxes, settings.table.dt)
 
 
 # The arguments of these are None where nobody asked, and numba leaves out of the kernel what they would need.

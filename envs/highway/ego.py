@@ -1,11 +1,14 @@
 """highway-env objects to shield arrays and back: the only reader of highway-env's internals."""
 
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle, MDPVehicle
 
+from rss_shield.envs.highway.contacts import touches
+from rss_shield.envs.highway.frames import Frame, Look
+from rss_shield.envs.highway.lane_changes import is_refused, offset_from, offset_from_target, reachable
 from rss_shield.envs.highway.senses import Senses, others_on
 from rss_shield.envs.options import LANES, OPEN_SPACE, PLANS, Settings
 from rss_shield.envs.roads.lanes import Heading, heading_of, reach_on, roads_along, tightest
@@ -23,8 +26,8 @@ from rss_shield.shield.lanes.correction import RESPONSE, in_full
 from rss_shield.shield.lanes.evasion import Room, evade
 from rss_shield.shield.lanes.frame import Bend, look_ahead, same_frame, to_lane_frame_all
 from rss_shield.shield.lanes.inflation import inflate
-from rss_shield.shield.lanes.judge import Log, judge_contact, judge_frame
-from rss_shield.shield.lanes.lane_changes import OFF_CENTRE, is_blocked, lead_back, turns_back
+from rss_shield.shield.lanes.judge import judge_contact, judge_frame
+from rss_shield.shield.lanes.lane_changes import lead_back
 from rss_shield.shield.lanes.memory import MEMORY, catch_up, forget_safe, start_over
 from rss_shield.shield.lanes.pair import ROAD_USER
 from rss_shield.shield.lanes.restriction import Body
@@ -44,57 +47,6 @@ from rss_shield.shield.tally import (
     start_episode,
 )
 from rss_shield.shield.verdicts import INHERITED, KEPT, VERDICTS, Verdict, weight_of
-
-
-class Frame(NamedTuple):
-    """One recorded frame: everything the shield saw, and the command that was executed."""
-
-    keys: tuple[int, ...]  # `[N]` identity of each user within the episode
-    poses: np.ndarray  # `[N + 1, 4]` x, y, heading, speed in the world, the ego last
-    command: Command
-    # in the lane frame of the ego, which nothing is measured in where roads cross
-    ego: np.ndarray | None = None  # `ROAD_USER`, 0-d
-    users: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` `ROAD_USER`
-    curvature: float = 0.0  # of the lane under the ego [1/m]
-    jumped: tuple[bool, ...] = ()  # `[N]` a user was moved in the lane frame, or with it
-    ego_before: np.ndarray | None = None  # `ROAD_USER` on the frame before, in the lane frame of this one
-    users_before: np.ndarray = np.zeros(0, ROAD_USER)  # `[N]` likewise
-
-
-class Look(NamedTuple):
-    """What a shield made of the last frame, for whoever films the episode."""
-
-    wish: Command  # of the ego's own controller
-    command: Command  # that was executed
-    overridden: bool
-    anticipated: bool
-    limited: bool
-    response: int  # sum of RESPONSE_*
-    partner: int  # index among `ShieldedEgo.others` of who is nearest to danger, or in the way; -1 = nobody
-    dangerous: bool
-
-
-def log_of(frames: list[Frame]) -> Log:
-    """Recorded frames as the arrays that `shield.lanes.judge.audit` reads."""
-    count = 1 + max((max(frame.keys, default=-1) for frame in frames), default=-1)
-    users, before = np.zeros((2, len(frames), count), ROAD_USER)
-    present, jumped = np.zeros((2, len(frames), count), bool)
-    for t, frame in enumerate(frames):
-        keys = list(frame.keys)
-        users[t, keys], before[t, keys] = frame.users, frame.users_before
-        present[t, keys], jumped[t, keys] = True, frame.jumped
-    return Log(
-        ego=np.array([frame.ego for frame in frames], ROAD_USER),
-        users=users,
-        present=present,
-        acceleration=np.array([frame.command.acceleration for frame in frames]),
-        slip=np.array([frame.command.slip for frame in frames]),
-        curvature=np.array([frame.curvature for frame in frames], float),
-        jumped=jumped,
-        ego_before=np.array([frame.ego_before for frame in frames], ROAD_USER),
-        users_before=before,
-    )
-
 
 # ---------------------------------------------------------------- one ego under the shield
 
@@ -140,6 +92,7 @@ class ShieldedEgo:
         self.poses_before = np.zeros((0, 4))  # one frame ago
         self.before = np.zeros((0, 2))  # positions one frame before `poses`
         self.earlier = np.zeros((0, 2))  # and before `poses_before`
+        self.sizes: list[tuple[float, float, bool]] = []  # length, width [m], does it drive; the ego last
         self.boxes = np.zeros((0, 4))
         self.last = (np.zeros(1, ROAD_USER)[0], np.zeros(0, ROAD_USER))  # ego and others on the frame before
         self.roads: dict = {}
@@ -268,7 +221,7 @@ class ShieldedEgo:
         """What the filter in force makes of a command."""
         settings, table = self.settings, self.settings.table
         if settings.filter.kind != RSS:
-            traffic = Traffic(ego, users, self.memory, self._offset_from_target(), None)
+            traffic = Traffic(ego, users, self.memory, offset_from_target(self.vehicle), None)
             state = self.answers, bool(self.tally["frames"] == 0)
             response, self.answers = answer(settings.filter, wish, traffic, danger.free, *state, body, table)
             return response
@@ -288,7 +241,7 @@ class ShieldedEgo:
         vehicle = self.vehicle
         start, end, lane = vehicle.lane_index
         lanes, width = len(vehicle.road.network.graph[start][end]), float(vehicle.lane.width_at(0.0))
-        offset, half = self._offset(vehicle.lane_index), 0.5 * (width - vehicle.WIDTH)
+        offset, half = offset_from(vehicle, vehicle.lane_index), 0.5 * (width - vehicle.WIDTH)
         return Room(lane * width + half + offset, (lanes - 1 - lane) * width + half - offset)
 
     def _count(self, danger, response, pairs: int, broken: int) -> None:
@@ -320,23 +273,7 @@ class ShieldedEgo:
 
     def is_refused(self, before, target) -> bool:
         """Is a change from one lane to another blocked, or does it come half-way through another?"""
-        if not self.settings.table.rules.take_back or target == before or target[:2] != before[:2]:
-            return False
-        back = turns_back(self._offset(self.vehicle.lane_index), self._offset(before), target[2] - before[2])
-        return bool(back or self._is_blocked(target))
-
-    def _offset_from_target(self) -> float:
-        """Offset from the centre of the lane that the ego heads for, positive to the right [m]."""
-        target = getattr(self.vehicle, "target_lane_index", None)
-        return 0.0 if target is None else self._offset(target)
-
-    def _is_blocked(self, index) -> bool:
-        """Is the way to the centre of a lane blocked?"""
-        return bool(is_blocked(self._offset(index), *self.rooms))
-
-    def _offset(self, index) -> float:
-        """Offset from the centre of a lane, positive to the right [m]."""
-        return float(self.vehicle.road.network.get_lane(index).local_coordinates(self.vehicle.position)[1])
+        return self.settings.table.rules.take_back and is_refused(self.vehicle, before, target, self.rooms)
 
     def _taken_back(self, wish: Command, ego, body: Body) -> Command:
         """What the agent wants, unless it is stuck between two lanes; and the lane that it heads for from now on."""
@@ -352,29 +289,11 @@ class ShieldedEgo:
                 self.tally["lane_change_refused"] = True
             return Command(wish.acceleration, float(slip))
         if isinstance(vehicle, MDPVehicle):
-            target = self._reachable(vehicle.lane_index, vehicle.target_lane_index)
+            target = reachable(vehicle, self.rooms)
             if target != vehicle.target_lane_index:
                 vehicle.target_lane_index = target
                 self.tally["lane_change_refused"] = True
         return wish
-
-    def _reachable(self, here, target):
-        """Lane that the ego can get to: its target, one on the way, the one it is on, or the one it has come from."""
-        if target[:2] != here[:2]:
-            return target
-        for i in range(target[2], here[2], 1 if here[2] > target[2] else -1):
-            if not self._is_blocked((*here[:2], i)):
-                return (*here[:2], i)
-        if target != here or not self._is_blocked(here):
-            return here
-        offset = self._offset(here)
-        if abs(offset) <= OFF_CENTRE:
-            return target
-        start, end, i = here
-        i += 1 if offset > 0.0 else -1
-        if not 0 <= i < len(self.vehicle.road.network.graph[start][end]) or self._is_blocked((start, end, i)):
-            return target
-        return start, end, i
 
     # -- reading the road
 
@@ -419,6 +338,9 @@ class ShieldedEgo:
             others = self.senses.look(others, vehicle, int(self.since["frames"]))
         if others != self.others or len(self.before) != len(others) + 1:
             self._follow(others)
+        sizes = [(v.LENGTH, v.WIDTH, hasattr(v, "action")) for v in [*others, vehicle]]
+        if sizes != self.sizes:  # few ever change
+            self._take_boxes(sizes)
         self.poses = np.array([(*v.position, v.heading, v.speed) for v in [*others, vehicle]], dtype=float)
         if self.senses is not None:  # motion is measured, not how far two measurements are apart
             self.before[:-1] = self.poses[:-1, :2] - self.senses.motion * self.settings.table.dt
@@ -470,9 +392,12 @@ class ShieldedEgo:
         self.others, self.memory, self.keys = others, memory, keys
         self.poses_before, self.before, self.earlier = poses, before, earlier
         self.last = (self.last[0], last)
+
+    def _take_boxes(self, sizes: list) -> None:
+        """How far everybody reaches in the lane frame."""
         bound, bend = self.settings.table.rules.heading_bound, tightest(self.vehicle.road.network)
-        everybody = [*others, self.vehicle]
-        self.boxes = np.array([box_of(v.LENGTH, v.WIDTH, bound, bend, hasattr(v, "action")) for v in everybody])
+        self.sizes = sizes
+        self.boxes = np.array([box_of(length, width, bound, bend, driven) for length, width, driven in sizes])
 
     def _choose_frame(self) -> None:
         """Measure along the road that the ego drives. Where that jumps, so does the sample before."""
@@ -553,7 +478,8 @@ class ShieldedEgo:
         self._meet()
         if not self.others:  # the flag was not raised by a contact
             return
-        touching = [i for i, other in enumerate(self.others) if self._touches(other)]
+        dt = self.settings.table.dt
+        touching = [i for i, other in enumerate(self.others) if touches(self.vehicle, other, dt)]
         if not touching:  # the flag came from elsewhere; the nearest road user is the likeliest partner
             touching = [int(np.argmin(np.hypot(*(self.poses[:-1, :2] - self.poses[-1, :2]).T)))]
         # several at once: the one that weighs most against the ego counts
@@ -569,15 +495,3 @@ class ShieldedEgo:
         for i in touching:
             catch_up(memory[i], self.last[0], self.last[1][i], settings.table)
         return [judge_contact(ego, users[i], memory[i], settings.table) for i in touching]
-
-    def _touches(self, other) -> bool:
-        """highway-env's own collision test, in its own order, without its effects."""
-        vehicle = self.vehicle
-        vehicles = vehicle.road.vehicles
-        first, second = vehicle, other
-        if other in vehicles and vehicles.index(other) < vehicles.index(vehicle):
-            first, second = other, vehicle
-        if not (first.check_collisions or second.check_collisions):
-            return False
-        touching, will_touch, _ = first._is_colliding(second, self.settings.table.dt)
-        return bool(touching or will_touch)

@@ -9,7 +9,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from rss_shield.envs.highway.around import around
-from rss_shield.envs.highway.ego import Look, ShieldedEgo
+from rss_shield.envs.highway.ego import ShieldedEgo
+from rss_shield.envs.highway.frames import Look
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.highway.step import shield_on
 from rss_shield.shield.lanes.responses import response_name

@@ -3,7 +3,8 @@
 import numpy as np
 from highway_env.vehicle.controller import ControlledVehicle
 
-from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo, carried_over
+from rss_shield.envs.highway.ego import ShieldedEgo, carried_over
+from rss_shield.envs.highway.frames import Frame, Look
 from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.paths import Size, size_of
 from rss_shield.envs.roads.slip import slip_of

@@ -8,8 +8,8 @@ from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
 from rss_shield.envs.arguments import actions_of, plain, seed_of
-from rss_shield.envs.highway.ego import Frame
 from rss_shield.envs.highway.egos import EgoShields
+from rss_shield.envs.highway.frames import Frame
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of
 from rss_shield.envs.highway.wrapper import traffic_info
 from rss_shield.envs.options import Given, Options, Params, check_action_type, check_kind

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 
-from rss_shield.envs.highway.ego import Frame, Look, ShieldedEgo, carried_over
+from rss_shield.envs.highway.ego import ShieldedEgo, carried_over
+from rss_shield.envs.highway.frames import Frame, Look
 from rss_shield.envs.options import Settings
 from rss_shield.shield.comfort import ride_on
 from rss_shield.shield.command import Command

@@ -9,8 +9,9 @@ import numpy as np
 from highway_env.vehicle.objects import Landmark
 
 from rss_shield.envs.highway.around import around
-from rss_shield.envs.highway.ego import Look, ShieldedEgo
+from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.egos import EgoShields
+from rss_shield.envs.highway.frames import Look
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.highway.step import shield_on
 from rss_shield.envs.options import LANES, OPEN_SPACE

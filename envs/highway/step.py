@@ -9,7 +9,8 @@ from highway_env.vehicle.dynamics import BicycleVehicle
 
 from rss_shield.envs.decisions.executed import executed_actions
 from rss_shield.envs.highway.compliant import TurnTaker
-from rss_shield.envs.highway.ego import ShieldedEgo, log_of
+from rss_shield.envs.highway.ego import ShieldedEgo
+from rss_shield.envs.highway.frames import log_of
 from rss_shield.envs.highway.free_ego import FreeEgo
 from rss_shield.envs.highway.junction_ego import JunctionEgo
 from rss_shield.envs.highway.open_ego import OpenSpaceEgo

@@ -9,9 +9,10 @@ from highway_env.envs.intersection_env import IntersectionEnv
 
 from rss_shield.envs.arguments import action_of, plain, seed_of
 from rss_shield.envs.decisions.replacement import order_of, replace
-from rss_shield.envs.highway.ego import Frame, ShieldedEgo
+from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.egos import EgoShields
 from rss_shield.envs.highway.foresight import action_mask, labels_of
+from rss_shield.envs.highway.frames import Frame
 from rss_shield.envs.highway.risk import RiskFrame
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of, tell_inside
 from rss_shield.envs.options import Given, Params, check_environment, check_replace

@@ -53,17 +53,20 @@ def is_trapped(scene, plan):
     """Would the shield have no plan now that stays clear of everybody, if it were on? It only watches.
 
     As in `choose` and `_escape`; `plan` is the one that would be in force then.
+
+    Returns:
+      (is it trapped, would braking stay clear of everybody).
     """
     brake = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt)
     if stop_conflict(scene, brake, EVERYBODY, ANYWHERE, 0.0) == NEVER:
         plan.go = 0
-        return False
+        return False, True
     if plan.go >= 0 and plan_conflict(scene, plan.go, EVERYBODY, 0.0) == NEVER:
         plan.go = max(plan.go - 1, 0)
-        return False
+        return False, False
     go_now = throttle(scene, scene.track.s, scene.track.v)
     plan.go = go_plan(scene, go_now, EVERYBODY, ANYWHERE, 0.0)[0]
-    return plan.go < 0
+    return plan.go < 0, False
 
 
 @inner
@@ -236,7 +239,7 @@ def _duties_broken(scene, a, users):
     broken = 0
     for i in range(users):
         alone = alone_with(scene, i)
-        items, kept = plans_and_duty(alone, i, a)
+        items, kept = plans_and_duty(alone, i, a, False)
         if items != 0 and not kept:
             broken += 1 if alone.threats[0].path >= 0 else users
     return broken

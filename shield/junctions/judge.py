@@ -1,5 +1,7 @@
 """Who broke a duty at a junction (Def. 27)."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rss_shield.shield._numba.compiled import apart, compiled, inner
@@ -44,8 +46,16 @@ _SEEN, _FAINT = (
 )  # shares of these tolerances: what counts at once, and what counts where nothing else does (J14)
 
 
+class Known(NamedTuple):
+    """What the choice of this frame's acceleration has found out of plans toward everybody."""
+
+    clear: bool  # one that stays clear of everybody remains afterwards
+    stops: bool  # braking on this frame would stay clear of everybody
+    trapped: bool  # none stays clear of everybody, because somebody appeared or left the bounds
+
+
 @compiled
-def judge_user(scene, i, sample, memory, a, strongest, clear, trapped):
+def judge_user(scene, i, sample, memory, a, strongest, known):
     """Take in one sample of one road user and judge the ego's acceleration toward it.
 
     Args:
@@ -53,9 +63,8 @@ def judge_user(scene, i, sample, memory, a, strongest, clear, trapped):
       i: index of the road user; sample: its SAMPLE; memory: its CROSSING, changed in place.
       a: acceleration that the ego executes on this frame [m/s^2].
       strongest: what follows if it accelerates as hard as it can, or as hard as that: `Braking`.
-      clear: a plan that stays clear of everybody is known to remain afterwards.
-      trapped: no plan stays clear of everybody, because somebody appeared or left the bounds. Duties
-        toward several then contradict each other: what is owed is to brake, or to go on, with all it has.
+      known: `Known`, False where nobody has looked. Duties of a trapped ego toward several contradict each other:
+        what is owed then is to brake, or to go on, with all it has.
 
     Returns:
       (dangerous, kept): is the ego not free toward this road user, and did it keep its duty? A contact is
@@ -72,8 +81,8 @@ def judge_user(scene, i, sample, memory, a, strongest, clear, trapped):
     if not follows:
         if may_meet(scene) and meets_braking(scene, strongest, i) != NEVER:
             dangerous = True
-            if not clear:
-                items, kept = plans_and_duty(scene, i, a)
+            if not known.clear:
+                items, kept = plans_and_duty(scene, i, a, known.stops)
         had_plan = memory.age > 0 and memory.since == 0 and not followed
         cut_in = items == 0 and had_plan and memory.way != scene.track.path and memory.other_broke == KEPT
     if may_follow and not memory.behind:
@@ -98,7 +107,7 @@ def judge_user(scene, i, sample, memory, a, strongest, clear, trapped):
     if memory.ego_broke == KEPT and (too_hard or not kept):
         memory.ego_broke = TOO_HARD if too_hard else LEFT_NO_PLAN if items != 0 else WAVERED
         memory.ego_excess = abs(a)
-    if trapped and not kept and not cut_in:
+    if known.trapped and not kept and not cut_in:
         kept = is_resolute(scene, a)
     memory.follows, memory.way = may_follow, scene.track.path
     memory.x, memory.y, memory.heading = sample.x, sample.y, sample.heading

@@ -6,8 +6,8 @@ import pytest
 import rss_shield
 from rss_shield import ExplainedRender
 from rss_shield.envs.highway.around import around
-from rss_shield.envs.highway.ego import Look
 from rss_shield.envs.highway.explained import LINE, line_of
+from rss_shield.envs.highway.frames import Look
 from rss_shield.shield.command import Command
 from rss_shield.shield.lanes.responses import RESPONSE_BRAKE
 

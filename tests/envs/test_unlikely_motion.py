@@ -5,7 +5,7 @@ import pytest
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield import make
-from rss_shield.shield.verdicts import ACCELERATED, DUTIES, JUMPED, LEFT_PATHS, REVERSED
+from rss_shield.shield.verdicts import ACCELERATED, DUTIES, JUMPED, LEFT_PATHS, REVERSED, TOO_CLOSE, TOO_FAR, TOO_SHORT
 
 EMPTY = {"initial_vehicle_count": 0, "spawn_probability": 0.0, "duration": 60}
 ROADS = {
@@ -123,3 +123,45 @@ def test_a_target_that_is_not_on_the_road_is_no_target():
     env, other = facing("intersection-v0", Creeper, 30.0, speed=1.0)
     other.target_lane_index = ("nowhere", "at all", 0)
     assert to_the_end(env)["blame"] in ("", "other")
+
+
+class Coasting(Vehicle):
+    """Holds its speed and its lane, and grows once."""
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+        self.frames, self.growth = 0, {}
+
+    def act(self, action=None):
+        super().act({"steering": 0.0, "acceleration": 0.0})
+        self.frames += 1
+        if self.frames == 12:
+            for name, more in self.growth.items():
+                setattr(self, name, getattr(self, name) + more)
+            self.diagonal = float(np.hypot(self.LENGTH, self.WIDTH))
+
+
+@pytest.mark.parametrize("kept", [True, False])
+@pytest.mark.parametrize(
+    ("ahead", "lane", "growth", "duty"),
+    [
+        (32.0, 0, {"LENGTH": 60.0}, TOO_SHORT),
+        (-60.0, 0, {"LENGTH": 120.0}, TOO_FAR),
+        (0.0, 1, {"WIDTH": 5.0}, TOO_CLOSE),
+        (0.0, 1, {"WIDTH": 30.0}, TOO_CLOSE),
+    ],
+    ids=["ahead", "behind", "beside", "beside, by far"],
+)
+def test_who_grows_into_the_ego_is_to_blame(ahead, lane, growth, duty, kept):
+    env = make("highway-fast-v0", shield="override" if kept else "monitor", config={"vehicles_count": 0})
+    env.reset(seed=1)
+    road, ego = env.unwrapped.road, env.unwrapped.vehicle
+    start, end, own = ego.lane_index
+    beside = road.network.get_lane((start, end, own + lane if own == 0 else own - lane))
+    s, _ = beside.local_coordinates(ego.position)
+    other = Coasting(road, beside.position(s + ahead, 0.0), ego.heading, ego.speed)
+    other.growth = growth
+    road.vehicles[:] = [ego, other]
+    info = to_the_end(env, action=1)
+    assert info["blame"] == "other"
+    assert info["blame_evidence"]["other_duty"] == DUTIES[duty]
