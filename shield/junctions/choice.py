@@ -12,9 +12,11 @@ from rss_shield.shield.junctions.limits import limit
 from rss_shield.shield.junctions.plans import (
     ANY_PLACE,
     ANYWHERE,
+    EVERY_FRAME,
     EVERYBODY,
     NEVER,
     SLACK,
+    TAIL,
     Scene,
     first_met,
     go_plan,
@@ -49,24 +51,13 @@ def choose(scene, plan, a, at_line, holds):
 
 
 @apart
-def is_trapped(scene, plan):
-    """Would the shield have no plan now that stays clear of everybody, if it were on? It only watches.
-
-    As in `choose` and `_escape`; `plan` is the one that would be in force then.
-
-    Returns:
-      (is it trapped, would braking stay clear of everybody).
-    """
+def is_trapped(scene):
+    """Is there no plan from now on that stays clear of everybody: neither to brake, nor to go on for however long?"""
     brake = limit(-scene.table.ego.a_min_brake, scene.track.v, scene.table.ego, scene.table.dt)
     if stop_conflict(scene, brake, EVERYBODY, ANYWHERE, 0.0) == NEVER:
-        plan.go = 0
-        return False, True
-    if plan.go >= 0 and plan_conflict(scene, plan.go, EVERYBODY, 0.0) == NEVER:
-        plan.go = max(plan.go - 1, 0)
-        return False, False
+        return False
     go_now = throttle(scene, scene.track.s, scene.track.v)
-    plan.go = go_plan(scene, go_now, EVERYBODY, ANYWHERE, 0.0)[0]
-    return plan.go < 0, False
+    return go_plan_past(scene, go_now, EVERYBODY, ANYWHERE, 0.0, ANY_PLACE, EVERY_FRAME)[0] < 0
 
 
 @inner
@@ -106,7 +97,7 @@ def _ease_off(scene, plan, wish, limits, rise, at_line):
     if rest >= limits.place:  # it comes to rest past the line
         line = np.inf
     if line < wish:
-        go, _ = go_plan_past(scene, wish, EVERYBODY, at_line, slack, limits.place)
+        go, _ = go_plan_past(scene, wish, EVERYBODY, at_line, slack, limits.place, TAIL)
         if go >= 0:
             a, plan.go = _pull_away(scene, wish, go, cap, at_line, limits.place)
             return a, True, True
@@ -132,7 +123,7 @@ def _pull_away(scene, wish, go, cap, at_line, place):
     """
     eased = limit(cap, scene.track.v, scene.table.ego, scene.table.dt)
     if eased < wish:
-        gently, _ = go_plan_past(scene, eased, EVERYBODY, at_line, SLACK + scene.drift, place)
+        gently, _ = go_plan_past(scene, eased, EVERYBODY, at_line, SLACK + scene.drift, place, TAIL)
         if gently > 0:
             return eased, gently
     return wish, go
@@ -239,7 +230,7 @@ def _duties_broken(scene, a, users):
     broken = 0
     for i in range(users):
         alone = alone_with(scene, i)
-        items, kept = plans_and_duty(alone, i, a, False)
+        items, kept = plans_and_duty(alone, i, a)
         if items != 0 and not kept:
             broken += 1 if alone.threats[0].path >= 0 else users
     return broken

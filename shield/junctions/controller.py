@@ -16,7 +16,7 @@ from rss_shield.shield.definitions.kinematics import time_to_collision
 from rss_shield.shield.junctions.choice import choose, ease, is_trapped, least_harm
 from rss_shield.shield.junctions.examined import TABLE, count_examined, examine, is_left_out
 from rss_shield.shield.junctions.followers import find_those_behind, is_behind, sort_out
-from rss_shield.shield.junctions.judge import Known, judge_user, note_who_trapped
+from rss_shield.shield.junctions.judge import asks_who_trapped, judge_user, note_who_trapped
 from rss_shield.shield.junctions.limits import limit
 from rss_shield.shield.junctions.plans import (
     EVERYBODY,
@@ -42,7 +42,7 @@ class JunctionReport(NamedTuple):
     response: int  # RESPONSE_BRAKE or RESPONSE_GO where it was overridden, else 0
     pairs: int  # road users toward whom the ego is not free
     broken: int  # those toward whom it broke its duty
-    trapped: bool  # no plan stays clear of everybody
+    trapped: bool  # no plan stays clear of everybody; who watches looks only where that matters to a verdict
     ttc: float  # time to collision with a car ahead on the path [s]
     examined: int  # road users against whom plans are checked
     possible: int  # all road users
@@ -71,7 +71,7 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
     sort_out(scene, memory, entry)
     examine(scene, samples, which, SLACK + scene.drift)
     limited = limit(nominal, scene.track.v, scene.table.ego, scene.table.dt)
-    a, clear, stops, trapped, anticipated = nominal, False, False, False, False
+    a, clear, trapped, anticipated = nominal, False, False, False
     if overrides:
         if rate > 0.0 and not holds:
             a, clear, anticipated = ease(scene, plan, memory, limited, at_line, rate)
@@ -80,18 +80,20 @@ def junction_frame(scene, samples, memory, plan, nominal, entry, at_line, which,
         if trapped:
             a = least_harm(scene, a, len(samples))
         plan.held_at = a if a < limited else np.inf
-    else:
-        trapped, stops = is_trapped(scene, plan)
-    pairs = broken = at = 0
+    pairs = broken = excused = at = 0
     hardest = limit(scene.table.ego.a_max_accel, scene.track.v, scene.table.ego, scene.table.dt)
     strongest = braking_after(scene, max(hardest, a))
     for i in range(len(samples)):
-        looked_at = which <= TABLE or not is_left_out(scene, i)
-        known = Known(looked_at and clear, looked_at and stops, trapped)
+        known = clear and (which <= TABLE or not is_left_out(scene, i))
         alone, at = next_alone(scene, i, at)
-        dangerous, kept = judge_user(alone, i, samples[i], memory[i], a, strongest, known)
+        dangerous, kept, resolute = judge_user(alone, i, samples[i], memory[i], a, strongest, known)
         pairs += dangerous
         broken += not kept
+        excused += resolute
+    if not overrides and (excused > 0 or asks_who_trapped(plan, memory)):  # who watches need not know it else
+        trapped = is_trapped(scene)
+    if trapped:
+        broken -= excused
     note_who_trapped(plan, memory, trapped, trapped and is_resolute(scene, a))
     anticipated = anticipated and a != limited
     changed = overrides and a != limited and not anticipated

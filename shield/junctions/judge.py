@@ -1,7 +1,5 @@
 """Who broke a duty at a junction (Def. 27)."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rss_shield.shield._numba.compiled import apart, compiled, inner
@@ -46,16 +44,8 @@ _SEEN, _FAINT = (
 )  # shares of these tolerances: what counts at once, and what counts where nothing else does (J14)
 
 
-class Known(NamedTuple):
-    """What the choice of this frame's acceleration has found out of plans toward everybody."""
-
-    clear: bool  # one that stays clear of everybody remains afterwards
-    stops: bool  # braking on this frame would stay clear of everybody
-    trapped: bool  # none stays clear of everybody, because somebody appeared or left the bounds
-
-
 @compiled
-def judge_user(scene, i, sample, memory, a, strongest, known):
+def judge_user(scene, i, sample, memory, a, strongest, clear):
     """Take in one sample of one road user and judge the ego's acceleration toward it.
 
     Args:
@@ -63,13 +53,14 @@ def judge_user(scene, i, sample, memory, a, strongest, known):
       i: index of the road user; sample: its SAMPLE; memory: its CROSSING, changed in place.
       a: acceleration that the ego executes on this frame [m/s^2].
       strongest: what follows if it accelerates as hard as it can, or as hard as that: `Braking`.
-      known: `Known`, False where nobody has looked. Duties of a trapped ego toward several contradict each other:
-        what is owed then is to brake, or to go on, with all it has.
+      clear: a plan that stays clear of everybody is known to remain afterwards.
 
     Returns:
-      (dangerous, kept): is the ego not free toward this road user, and did it keep its duty? A contact is
-      judged more strictly: whoever left itself no plan toward the other is to blame, unless somebody's breach has
-      trapped it (`note_who_trapped`).
+      (dangerous, kept, excused): is the ego not free toward this road user, did it keep its duty, and does it do so
+      all the same if it is trapped? Then no plan stays clear of everybody, because somebody appeared or left the
+      bounds, and duties toward several contradict each other: what is owed is to brake, or to go on, with all it has.
+      A contact is judged more strictly: whoever left itself no plan toward the other is to blame, unless somebody's
+      breach has trapped it (`note_who_trapped`).
     """
     _judge_motion(sample, memory, scene.table.other, scene.table.dt)
     memory.was_lawless = memory.other_broke != KEPT
@@ -81,8 +72,8 @@ def judge_user(scene, i, sample, memory, a, strongest, known):
     if not follows:
         if may_meet(scene) and meets_braking(scene, strongest, i) != NEVER:
             dangerous = True
-            if not known.clear:
-                items, kept = plans_and_duty(scene, i, a, known.stops)
+            if not clear:
+                items, kept = plans_and_duty(scene, i, a)
         had_plan = memory.age > 0 and memory.since == 0 and not followed
         cut_in = items == 0 and had_plan and memory.way != scene.track.path and memory.other_broke == KEPT
     if may_follow and not memory.behind:
@@ -107,8 +98,7 @@ def judge_user(scene, i, sample, memory, a, strongest, known):
     if memory.ego_broke == KEPT and (too_hard or not kept):
         memory.ego_broke = TOO_HARD if too_hard else LEFT_NO_PLAN if items != 0 else WAVERED
         memory.ego_excess = abs(a)
-    if known.trapped and not kept and not cut_in:
-        kept = is_resolute(scene, a)
+    excused = not kept and not cut_in and is_resolute(scene, a)
     memory.follows, memory.way = may_follow, scene.track.path
     memory.x, memory.y, memory.heading = sample.x, sample.y, sample.heading
     memory.speed, memory.lanes = sample.speed, sample.next_lanes
@@ -116,7 +106,7 @@ def judge_user(scene, i, sample, memory, a, strongest, known):
     memory.wreck, memory.astray = sample.wreck, sample.astray
     memory.age += 1
     memory.relied, memory.relied_before = False, memory.relied
-    return dangerous, kept
+    return dangerous, kept, excused
 
 
 @inner
@@ -198,6 +188,15 @@ def _count_on(scene, stands_for):
     for k in range(len(scene.threats)):
         scene.threats[k].stands_for = stands_for
         look_ahead(scene, scene.threats[k])
+
+
+@inner
+def asks_who_trapped(plan, memory):
+    """Does it matter whether the ego is trapped, because somebody has broken a duty?"""
+    asks = plan.wronged
+    for i in range(len(memory)):
+        asks |= memory[i].was_lawless
+    return asks
 
 
 @inner

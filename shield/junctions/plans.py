@@ -46,6 +46,7 @@ START_UP = 2.5  # from when the ego has no other plan [s]
 
 SLACK = 0.2  # a new plan stays clear even if the ego is this far off; one in force only has to stay clear [m]
 TAIL = 3  # frames between two moments at which a go plan may begin to brake
+EVERY_FRAME = 1  # no frame between them
 LONGEST = 10.0  # throttle phase of a plan, at most [s]
 _BETWEEN = 3.0  # cars that follow each other are in each other's way with so much between them, margins included [m]
 REST = 1e-9  # below this speed a plan has come to rest [m/s]
@@ -495,19 +496,19 @@ def go_plan(scene, a, only, at_line, slack):
       (frames of throttle, frame of the first conflict): frames = -1 if there is no such plan; then the
       latest first conflict of all, as `tail_conflict` says it.
     """
-    return go_plan_past(scene, a, only, at_line, slack, ANY_PLACE)
+    return go_plan_past(scene, a, only, at_line, slack, ANY_PLACE, TAIL)
 
 
 @compiled
-def go_plan_past(scene, a, only, at_line, slack, place):
-    """`go_plan`, but none that comes to rest before a `place` [m]."""
+def go_plan_past(scene, a, only, at_line, slack, place, stride):
+    """`go_plan`, but none that comes to rest before a `place` [m], and braking tried every `stride` frames."""
     begin(scene)
     s, v = step(scene.track.s, scene.track.v, a, scene.table.dt)
     n, latest = NEXT, NOW
     while n * scene.table.dt < LONGEST:
         if _meets_anyone(scene, s, v, n, only, slack):
             return -1, max(latest, n)
-        if n % TAIL == TAIL - 1 and s + stopping_distance(v, scene.table.ego.a_min_brake) >= place:
+        if n % stride == stride - 1 and s + stopping_distance(v, scene.table.ego.a_min_brake) >= place:
             conflict = tail_conflict(scene, s, v, n, scene.table.ego.a_min_brake, only, at_line, slack)
             if conflict == NEVER:
                 return n - 1, NEVER

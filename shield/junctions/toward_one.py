@@ -39,12 +39,9 @@ def may_meet(scene):
 
 
 @apart
-def plans_and_duty(scene, i, a, stops):
-    """Kinds of plans that stay clear of one road user from this sample on, and does the ego do its duty toward it?
-
-    `stops`: braking on this frame is known to stay clear of it.
-    """
-    items = STOP if stops else _plans_now(scene, i)
+def plans_and_duty(scene, i, a):
+    """Kinds of plans that stay clear of one road user from this sample on, and does the ego do its duty toward it?"""
+    items = _plans_now(scene, i)
     return items, (leaves_plan_toward(scene, i, a) if items != 0 else is_resolute(scene, a))
 
 
