@@ -5,6 +5,7 @@ from places import ROOT
 
 from rss_shield import train
 from rss_shield.cli import main
+from rss_shield.eval.suite.comparison.options import FIRST_TEST_SEED
 from rss_shield.experiment import expanded
 
 TWO_ROADS = """
@@ -48,7 +49,7 @@ def test_test_and_report_take_what_is_there(file, tmp_path):
     there = ["--runs-dir", str(tmp_path / "runs")]
     (words,) = expanded("test", [file, *there, "--tests", "on"])
     assert words == [
-        *(str(run / "shielded-seed0" / "model.zip"), "--episodes", "40", "--first-seed", str(train.FIRST_TEST_SEED)),
+        *(str(run / "shielded-seed0" / "model.zip"), "--episodes", "40", "--first-seed", str(FIRST_TEST_SEED)),
         *("--tests", "on"),
     ]
     assert expanded("report", [file, *there, "--out", "x"]) == [[str(run), "--out", "x"]]
