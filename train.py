@@ -20,11 +20,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pandas as pd
-from gymnasium.vector import AutoresetMode, VectorEnv
 
-import rss_shield
 from rss_shield.agents.blocks import available_devices, train_in_blocks
-from rss_shield.agents.learner import Learner, learner_of
 from rss_shield.agents.load import load_policy, policy_of
 from rss_shield.agents.own_reward import RewardFailed
 from rss_shield.agents.trackers import TRACKERS, check_tracker
@@ -32,20 +29,22 @@ from rss_shield.command_line import Overrides, fail, parsed, shown
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.envs.fast.config import Unsupported
-from rss_shield.envs.highway.idm_ego import make_idm_vec
 from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, scheme_of
-from rss_shield.eval import drivers, removal
-from rss_shield.eval.arms import FROM_OPTIONS, SHIELDED, Arm, arm_named, table
+from rss_shield.eval import removal
+from rss_shield.eval.arms import Arm, arm_named, table
 from rss_shield.eval.config_option import HYPERPARAMETERS, Keys, split_arguments, with_values
 from rss_shield.eval.jobs import Job, run_jobs
-from rss_shield.eval.own import OwnFailed, blaming, digests, driver_named, function_named, is_own
+from rss_shield.eval.own import OwnFailed, blaming, digests, function_named, is_own
 from rss_shield.eval.replay import chosen, replay
 from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import changes, open_run, recorded
 from rss_shield.eval.suite import showcase
+from rss_shield.eval.suite.comparison.acting import driver, learner
+from rss_shield.eval.suite.comparison.making import batch, original, test_batch, wrapped
 from rss_shield.eval.suite.comparison.options import COMMAND, FIRST_REMOVAL_SEED, FIRST_TEST_SEED, HELP, Config
+from rss_shield.eval.suite.comparison.trying import tried
 from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in, usual_preset
 from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.shield.junctions.memory import ENTRIES
@@ -59,8 +58,6 @@ NAMES = "letters, digits and . , = + - _"
 SEEDS = "different whole numbers, 0 to 2**32 - 1, at least one"
 LONGEST_NAME = 120
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
-# options of the shield that have no place of their own in `setting`
-WRAPPED = ("rules", "examine", "traffic", "filter", "filter_at", "correction", "replace", "risk")
 
 
 def main(arguments: list[str]) -> None:
@@ -186,96 +183,6 @@ def stored_config(options: dict[str, Any]) -> Config:
     return Config(**known)
 
 
-def tried(config: Config, preset: Preset) -> gym.Env:
-    """The original environment, after bad values of any kind have shown.
-
-    Raises:
-      ValueError: says what is wrong, and with which keys of the environment's configuration.
-    """
-    try:
-        return _tried(config, preset)
-    except Exception as error:
-        if not config.config or not _works(replace(config, config={}), preset):
-            raise
-        alone = [{key: value} for key, value in config.config.items()]
-        bad = [one for one in alone if not _works(replace(config, config=one), preset)] or alone
-        named = ", ".join(f"config.{key} = {value!r}" for one in bad for key, value in one.items())
-        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
-        raise ValueError(f"{named}: not possible in {config.env_id}: {kind}{error}") from error
-
-
-def _works(config: Config, preset: Preset) -> bool:
-    try:
-        _tried(config, preset)
-    except Exception:
-        return False
-    return True
-
-
-def _tried(config: Config, preset: Preset) -> gym.Env:
-    envs = [_tried_arm(config, preset, arm_named(name)) for name in _unlike(config.arms)]
-    return envs[0]
-
-
-def _unlike(names: Sequence[str]) -> list[str]:
-    """One arm of each kind of environment."""
-    arms = {name: arm_named(name) for name in reversed(names)}
-    kinds = {name: shown(sorted({**arm.config, **arm.chooses}.items())) for name, arm in arms.items()}
-    return list({kind: name for name, kind in kinds.items()}.values())[::-1]
-
-
-def _tried_arm(config: Config, preset: Preset, arm: Arm) -> gym.Env:
-    env = original(config, preset, arm, SHIELDED)()
-    env.close()
-    actions, observations = env.action_space, env.observation_space
-    kind, called = (gym.spaces.Box, "a Box") if arm.continuous else (gym.spaces.Discrete, "Discrete ones")
-    if not isinstance(actions, kind):
-        raise ValueError(f"env_id = {config.env_id!r}: actions {actions}; expected {called}")
-    if not (isinstance(observations, gym.spaces.Box) and np.issubdtype(observations.dtype, np.floating)):
-        raise ValueError(f"env_id = {config.env_id!r}: observations {observations}; expected a Box of floats")
-    first = batch(config, preset, arm, SHIELDED, n_envs=1)
-    first.reset(seed=0)
-    first.step(np.zeros((1, *(actions.shape or ())), actions.dtype))  # and the engine is compiled once for all workers
-    first.close()
-    return env
-
-
-def original(config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any]) -> Callable[..., gym.Env]:
-    """Builds an environment of the original simulator."""
-    options = {**wrapped(config), **shield, **setting(config, arm)}
-    return functools.partial(rss_shield.make, config.env_id, params=preset, **options)
-
-
-def batch(
-    config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any], n_envs: int, **options: Any
-) -> VectorEnv:
-    """Environments of the chosen simulator side by side, as an arm needs them."""
-    given = {**wrapped(config), **shield, **setting(config, arm)}
-    options = {"backend": config.backend, **options, "params": preset, **given}
-    return rss_shield.make_vec(config.env_id, n_envs, **options)
-
-
-def test_batch(config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any], n_envs: int) -> VectorEnv:
-    """The same for tests, where the next episode begins when it is told to."""
-    if arm.scripted and arm.settings["driver"] == "idm":
-        return make_idm_vec(config.env_id, n_envs, params=preset, **wrapped(config), **shield, **setting(config, arm))
-    return batch(config, preset, arm, shield, n_envs, autoreset_mode=AutoresetMode.DISABLED)
-
-
-def setting(config: Config, arm: Arm) -> dict[str, Any]:
-    """The environment's configuration, if it is told any, among what the ego chooses, and its conduct at junctions."""
-    conduct = {"entry": config.entry, "intent": config.intent, "waiting": config.waiting, **arm.chooses}
-    configured = {**config.config, **arm.config}
-    return {**conduct, "config": configured} if configured else conduct
-
-
-def wrapped(config: Config) -> dict[str, Any]:
-    """Other options of the shield's, as far as they are not its defaults; what an arm says comes before them."""
-    default = Options()
-    given = {name: getattr(config, name) for name in WRAPPED}
-    return {name: value for name, value in given.items() if value != getattr(default, name)}
-
-
 def model_path(folder: Path, arm: str, seed: int) -> Path:
     """The trained model; `train` puts it there when it is finished."""
     return folder / f"{arm}-seed{seed}" / "model.zip"
@@ -300,16 +207,6 @@ def replaying(config: Config, preset: Preset, folder: Path, arm: str, seed: int,
 def showing(config: Config, preset: Preset, folder: Path, arm: str) -> Job:
     work = functools.partial(_show, config, preset, folder, arm)
     return Job(f"show {arm}", showcase.shown(tuple(arm_named(arm).tests)), "episode", work)
-
-
-def learner(config: Config, arm: Arm) -> Learner:
-    """The learner of an arm."""
-    fixed = {name: value for name, value in arm.settings.items() if name != FROM_OPTIONS}
-    asked = {name: getattr(config, option) for name, option in arm.settings.get(FROM_OPTIONS, {}).items()}
-    try:
-        return learner_of(arm.learner, **fixed, **asked).with_hyperparameters(config.hyperparameters)
-    except ValueError as error:
-        raise ValueError(f"arm {arm.name}: {error}") from None
 
 
 def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, progress: Progress) -> None:
@@ -381,23 +278,6 @@ def _played(
         progress=progress,
         more=columns_of,
     )
-
-
-def driver(config: Config, preset: Preset, arm: Arm, seed: int) -> drivers.Driver:
-    """The policy of an arm that learns nothing."""
-    if arm.own:
-        return driver_named(arm.name)
-    env: Any = original(config, preset, arm, SHIELDED)()
-    env.close()
-    numbers = env.unwrapped.action_type.actions_indexes
-    name = arm.settings["driver"]
-    if name == "semantic":
-        return drivers.best_value()
-    if name == "any semantic":
-        return drivers.any_valid(np.random.default_rng(seed))
-    if name == "random":
-        return drivers.uniform(len(numbers), np.random.default_rng(seed))
-    return drivers.always(numbers["IDLE" if name == "idm" else name])  # that one drives itself
 
 
 def _replay(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:

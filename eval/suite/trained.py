@@ -9,6 +9,7 @@ from typing import Any
 from rss_shield import train
 from rss_shield.eval.runs.experiment import training_words
 from rss_shield.eval.runs.store import Files
+from rss_shield.eval.suite.comparison.trying import tried
 
 _KEPT = ("learning_curve.csv", "removal_curve.csv", "model.zip", "card.json", "README.md")
 
@@ -36,7 +37,7 @@ def check_trained(config: dict[str, Any]) -> None:
 def _tried(arguments: list[str]) -> None:
     options, _ = train.started(arguments)
     try:
-        train.tried(options, train.resolve(options))
+        tried(options, train.resolve(options))
     except ValueError:
         raise
     except Exception as error:
