@@ -5,59 +5,43 @@ from rss_shield.eval.interrupt import stop_on_interrupt
 if __name__ == "__main__":  # before all that takes its time
     stop_on_interrupt("train.py: stopping; nothing that is finished is lost, the same command with --resume goes on")
 
-import functools
-import hashlib
 import itertools
 import math
 import multiprocessing
-import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
-import numpy as np
-import pandas as pd
-
-from rss_shield.agents.blocks import available_devices, train_in_blocks
-from rss_shield.agents.load import load_policy, policy_of
+from rss_shield.agents.blocks import available_devices
 from rss_shield.agents.own_reward import RewardFailed
 from rss_shield.agents.trackers import TRACKERS, check_tracker
 from rss_shield.command_line import Overrides, fail, parsed, shown
 from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.configuration import check_config, default_config
-from rss_shield.envs.fast.config import Unsupported
 from rss_shield.envs.make_vec import BACKENDS
-from rss_shield.envs.options import PENALTIES, PLANS, WAITING, Options, scheme_of
-from rss_shield.eval import removal
-from rss_shield.eval.arms import Arm, arm_named, table
+from rss_shield.envs.options import PENALTIES, WAITING, Options
+from rss_shield.eval.arms import arm_named, table
 from rss_shield.eval.config_option import HYPERPARAMETERS, Keys, split_arguments, with_values
-from rss_shield.eval.jobs import Job, run_jobs
-from rss_shield.eval.own import OwnFailed, blaming, digests, function_named, is_own
-from rss_shield.eval.replay import chosen, replay
-from rss_shield.eval.report import cell_path, read_cell, replay_path, write_cell, write_report
-from rss_shield.eval.rollout import evaluate
+from rss_shield.eval.jobs import run_jobs
+from rss_shield.eval.own import OwnFailed, function_named, is_own
+from rss_shield.eval.report import cell_path, replay_path, write_report
 from rss_shield.eval.run_folder import changes, open_run, recorded
-from rss_shield.eval.suite import showcase
-from rss_shield.eval.suite.comparison.acting import driver, learner
-from rss_shield.eval.suite.comparison.making import batch, original, test_batch, wrapped
-from rss_shield.eval.suite.comparison.options import COMMAND, FIRST_REMOVAL_SEED, FIRST_TEST_SEED, HELP, Config
+from rss_shield.eval.suite.comparison.acting import learner
+from rss_shield.eval.suite.comparison.jobs import cells_of, in_engine, model_path, replaying, showing, testing, training
+from rss_shield.eval.suite.comparison.making import wrapped
+from rss_shield.eval.suite.comparison.naming import NAMES, run_name, valid_name
+from rss_shield.eval.suite.comparison.options import COMMAND, HELP, Config
+from rss_shield.eval.suite.comparison.record import options_of, record
 from rss_shield.eval.suite.comparison.trying import tried
 from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in, usual_preset
-from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
-from rss_shield.shield.params import PRESETS, Preset, Rules, with_parameters
+from rss_shield.shield.params import PRESETS, Preset, with_parameters
 
-TEST_ENVS = {"fast": 256, "highway-env": 1}  # side by side in testing; the engine is the faster, the more there are
 PROGRAM = "train.py" if __name__ == "__main__" else COMMAND  # as it was called
-Progress = Callable[[int], None]
-NAMES = "letters, digits and . , = + - _"
 SEEDS = "different whole numbers, 0 to 2**32 - 1, at least one"
-LONGEST_NAME = 120
-DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
 
 
 def main(arguments: list[str]) -> None:
@@ -90,18 +74,6 @@ def main(arguments: list[str]) -> None:
 
     write_report(folder)
     print(f"\nEverything is in {folder}: table.md, results.json, learning_curve.png, blame.png, ...")
-
-
-def cells_of(config: Config, arm: Arm, seed: int) -> list[tuple[str, int, str]]:
-    """Where an arm is tested; who learns nothing is tested once, not once a training seed."""
-    if arm.scripted and seed != config.seeds[0]:
-        return []
-    return [(arm.name, seed, test) for test in arm.tests]
-
-
-def in_engine(arm: Arm) -> bool:
-    """Can its episodes be played by numbered meta-actions in the engine?"""
-    return not arm.backend and not arm.continuous and not arm.chooses
 
 
 def print_arms() -> None:
@@ -181,117 +153,6 @@ def stored_config(options: dict[str, Any]) -> Config:
     for name in ("ego", "other"):
         known[name] = Overrides(**{parameter: float(value) for parameter, value in known[name].items()})
     return Config(**known)
-
-
-def model_path(folder: Path, arm: str, seed: int) -> Path:
-    """The trained model; `train` puts it there when it is finished."""
-    return folder / f"{arm}-seed{seed}" / "model.zip"
-
-
-def training(config: Config, preset: Preset, folder: Path, arm: str, seed: int) -> Job:
-    total = learner(config, arm_named(arm)).rounded(config.n_envs, config.total_timesteps)
-    return Job(f"train {arm}, seed {seed}", total, "step", functools.partial(_train, config, preset, folder, arm, seed))
-
-
-def testing(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str) -> Job:
-    work = functools.partial(_test, config, preset, folder, arm, seed, test)
-    return Job(f"test {arm}, seed {seed}, shield {test}", config.eval_episodes, "episode", work)
-
-
-def replaying(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str) -> Job:
-    count = min(config.replay_episodes, config.eval_episodes)
-    work = functools.partial(_replay, config, preset, folder, arm, seed, test)
-    return Job(f"replay {arm}, seed {seed}, shield {test}", count, "episode", work)
-
-
-def showing(config: Config, preset: Preset, folder: Path, arm: str) -> Job:
-    work = functools.partial(_show, config, preset, folder, arm)
-    return Job(f"show {arm}", showcase.shown(tuple(arm_named(arm).tests)), "episode", work)
-
-
-def _train(config: Config, preset: Preset, folder: Path, arm: str, seed: int, progress: Progress) -> None:
-    row = arm_named(arm)
-    paid = {"intervention_penalty": config.intervention_penalty, "penalty_on": config.penalty_on}
-    chosen = learner(config, row)
-    total = chosen.rounded(config.n_envs, config.total_timesteps)
-    path = model_path(folder, arm, seed).parent / removal.FILE
-    train_in_blocks(
-        chosen,
-        functools.partial(batch, config, preset, row, {**paid, **row.training}),
-        model_path(folder, arm, seed).parent,
-        seed=seed,
-        total_timesteps=config.total_timesteps,
-        n_envs=config.n_envs,
-        device=config.device,
-        progress=progress,
-        reward=blaming(function_named(config.reward), config.reward) if config.reward else None,
-        tracker=config.tracker,
-        watch=functools.partial(_remove, config, preset, row, total, path),
-    )
-
-
-def _remove(config: Config, preset: Preset, arm: Arm, total: int, path: Path, model: Any) -> None:
-    """Test the agent as it is now with the shield and without, if it is time to."""
-    rows = removal.read(path)
-    rows = rows[rows["timesteps"] < model.num_timesteps]  # what a killed run had gone on to will happen again
-    if not config.removal_checks or not config.removal_episodes:
-        return
-    if not removal.is_due(rows, model.num_timesteps, total, config.removal_checks):
-        return
-    try:
-        here = replace(config, backend="fast")  # the same trajectories, sooner
-        tests = {
-            test: _played(here, preset, arm, shield, policy_of(model), FIRST_REMOVAL_SEED, config.removal_episodes)
-            for test, shield in arm.tests.items()
-        }
-    except Unsupported:
-        return
-    removal.record(path, rows, model.num_timesteps, tests)
-
-
-def _test(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:
-    row = arm_named(arm)
-    policy = driver(config, preset, row, seed) if row.scripted else load_policy(model_path(folder, arm, seed))
-    count = config.eval_episodes
-    episodes = _played(config, preset, row, row.tests[test], policy, FIRST_TEST_SEED, count, progress)
-    write_cell(cell_path(folder, arm, seed, test), episodes, arm, seed, test)
-
-
-def _played(
-    config: Config,
-    preset: Preset,
-    arm: Arm,
-    shield: Mapping[str, Any],
-    policy: Callable[..., np.ndarray],
-    first: int,
-    count: int,
-    progress: Progress = lambda episodes: None,
-) -> pd.DataFrame:
-    make: Callable[[int], Any] = functools.partial(test_batch, config, preset, arm, shield)
-    return evaluate(
-        scored(make, config.reward),
-        policy,
-        range(first, first + count),
-        n_envs=TEST_ENVS[arm.backend or config.backend],
-        keep_actions=in_engine(arm),
-        masked=arm.masked and shield["shield"] == "override",
-        progress=progress,
-        more=columns_of,
-    )
-
-
-def _replay(config: Config, preset: Preset, folder: Path, arm: str, seed: int, test: str, progress: Progress) -> None:
-    row = arm_named(arm)
-    sample = chosen(read_cell(cell_path(folder, arm, seed, test)), config.replay_episodes, seed)
-    replays = replay(original(config, preset, row, row.tests[test]), sample, progress)
-    write_cell(replay_path(folder, arm, seed, test), replays, arm, seed, test)
-
-
-def _show(config: Config, preset: Preset, folder: Path, arm: str, progress: Progress) -> None:
-    row, seed = arm_named(arm), config.seeds[0]
-    tests = {test: read_cell(cell_path(folder, arm, seed, test)) for test in row.tests}
-    making = {test: original(config, preset, row, shield) for test, shield in row.tests.items()}
-    showcase.show(tests, making.__getitem__, folder, arm, f"{row.label}, {config.env_id}", progress)
 
 
 def parse(arguments: list[str], default: Config) -> Config:
@@ -381,59 +242,6 @@ def resolve(config: Config) -> Preset:
         return with_parameters(preset_in(preset_name(config)), config.ego.given, config.other.given)
     except ValueError as error:
         raise ValueError(f"--{error}") from None
-
-
-def options_of(config: Config) -> dict[str, Any]:
-    """Every option but those that only say where and how to start."""
-    options = {f.name: getattr(config, f.name) for f in fields(config) if f.name not in _NOT_RECORDED}
-    rules = {name: value for name, value, _ in changes(config.rules._asdict(), Rules()._asdict())}
-    return {**options, "ego": config.ego.given, "other": config.other.given, "rules": rules}
-
-
-def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
-    """All that the result depends on."""
-    parameters = {"ego": preset.ego._asdict(), "other": preset.other._asdict()}
-    own = digests([*config.arms, config.reward, config.preset])  # what is changed later is another run
-    return {
-        **options_of(config),
-        "parameters": {
-            **parameters,
-            "per_frame": preset.per_frame,
-            "source": preset.source,
-            "roads_cross": scheme_of(env.unwrapped) == PLANS,  # otherwise entry, intent and waiting change nothing
-            "rules": config.rules._asdict(),  # the margins of the published table
-        },
-        "environment": env.unwrapped.config,  # type: ignore[attr-defined]  # the whole of it
-        **{
-            arm.name if arm.settings else arm.learner: learner(config, arm).hyperparameters(
-                config.n_envs, config.total_timesteps
-            )
-            for arm in map(arm_named, config.arms)
-            if not arm.scripted
-        },
-        **({"sources": own} if own else {}),
-        "test_seeds": {"first": FIRST_TEST_SEED, "last": FIRST_TEST_SEED + config.eval_episodes - 1},
-    }
-
-
-def run_name(config: Config) -> str:
-    """The environment, then every option that differs from its default."""
-    chosen_options = changes(options_of(config), options_of(Config()))
-    parts = [f"{name}={shown(value, '-')}" for name, value, _ in chosen_options if name != "env_id"]
-    return valid_name(",".join([config.env_id, *parts]))
-
-
-def valid_name(text: str) -> str:
-    """A name of a folder that every system takes: no / \\ : * ? " < > |, no dot at an end, no device, not too long."""
-    name = re.sub(r"[^\w=.,+-]+", "-", text).strip("-.")
-    if name.split(".")[0].upper() in DEVICES:
-        name = f"_{name}"
-    if len(name) > LONGEST_NAME:
-        name = f"{name[: LONGEST_NAME - 9]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
-    return name
-
-
-_NOT_RECORDED = ("list_arms", "workers", "tracker", "name", "runs_dir", "resume", "resume_or_start", "overwrite")
 
 
 def run(arguments: list[str]) -> None:
