@@ -35,7 +35,10 @@ def check_seeds(arguments: list[str], program: str) -> None:
 
 
 def check(config: Config, program: str) -> None:
-    """Refuse what is out of range, naming option, value and range. RSS parameters: see `reading.resolve`."""
+    """Refuse what is out of range, naming option, value and range.
+
+    RSS parameters: see `eval.suite.comparison.reading.resolve`.
+    """
     try:
         rules_of(config.rules, "--rules")
         if config.tracker in TRACKERS:
