@@ -43,7 +43,7 @@ from rss_shield.shield.params import PRESETS, Preset, RSSParams, with_parameters
 
 PROGRAM = "rss-shield test"
 ENV_ID = "highway-fast-v0"
-FIRST_SEED = 10**9  # as in train.py
+FIRST_SEED = 10**9  # as train.py's tests
 SIDE_BY_SIDE = {"fast": 256, "highway-env": 1}
 HELP = """Test a trained model, or a policy of one's own, with the shield and without; say who crashes.
 

@@ -3,8 +3,9 @@
 import pytest
 from places import ROOT
 
-from rss_shield import train
 from rss_shield.cli import main
+from rss_shield.eval.suite.comparison.options import FIRST_TEST_SEED
+from rss_shield.eval.suite.comparison.reading import started
 from rss_shield.experiment import expanded
 
 TWO_ROADS = """
@@ -30,7 +31,7 @@ def test_an_experiment_is_one_training_run_per_road(file):
         "--eval-episodes 40 --total-timesteps 500 --risk --rules.memory False --config.lanes-count 2 --workers 1"
     )
     assert second[:5] == ["--name", "two-roads-merge-v0", "--resume-or-start", "--env-id", "merge-v0"]
-    config, folder = train.started(first)
+    config, folder = started(first)
     assert config.risk and not config.rules.memory and config.config == {"lanes_count": 2}
     assert folder.name == "two-roads-highway-fast-v0"
 
@@ -38,7 +39,7 @@ def test_an_experiment_is_one_training_run_per_road(file):
 @pytest.mark.parametrize("name", ["compare", "arms"])
 def test_the_experiments_of_the_docs_are_what_training_takes(name):
     for words in expanded("train", [str(ROOT / "experiments" / f"{name}.yaml")]):
-        train.started(words)
+        started(words)
 
 
 def test_test_and_report_take_what_is_there(file, tmp_path):
@@ -48,7 +49,7 @@ def test_test_and_report_take_what_is_there(file, tmp_path):
     there = ["--runs-dir", str(tmp_path / "runs")]
     (words,) = expanded("test", [file, *there, "--tests", "on"])
     assert words == [
-        *(str(run / "shielded-seed0" / "model.zip"), "--episodes", "40", "--first-seed", str(train.FIRST_TEST_SEED)),
+        *(str(run / "shielded-seed0" / "model.zip"), "--episodes", "40", "--first-seed", str(FIRST_TEST_SEED)),
         *("--tests", "on"),
     ]
     assert expanded("report", [file, *there, "--out", "x"]) == [[str(run), "--out", "x"]]

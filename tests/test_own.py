@@ -22,6 +22,7 @@ from rss_shield.eval.plots import style_of
 from rss_shield.eval.report import cell_path
 from rss_shield.eval.runs.experiment import experiment_of
 from rss_shield.eval.runs.tasks import tasks_of
+from rss_shield.eval.suite.comparison.reading import resolve, started
 from rss_shield.eval.suite.own_table import preset_in
 from rss_shield.eval.suite.scored import Scored, columns_of
 from rss_shield.eval.suite.sweep import check_tasks
@@ -76,7 +77,7 @@ def test_what_cannot_be_looked_up_is_said_in_one_line(name, message, capsys):
     assert message in str(error.value)
     for option in (["--arms", "lazy", name], ["--reward", name])[":" not in name :]:
         with pytest.raises(SystemExit):
-            train.started(option)
+            started(option)
         assert message in capsys.readouterr().err
 
 
@@ -106,7 +107,7 @@ def test_a_policy_of_ones_own_is_an_arm():
     assert arm.own and arm.scripted and arm_called(arm.name) == arm and style_of(arm.name)["marker"] == "*"
     assert cell_path(Path("run"), "brought:drive", 0, "on").name == "brought-drive-seed0-test-on.csv"
     assert arm_called("off").name == "unshielded" and arm_called("nobody") is None
-    config, folder = train.started(["--arms", "shielded", "brought:drive"])
+    config, folder = started(["--arms", "shielded", "brought:drive"])
     assert config.arms == ("shielded", "brought:drive") and ":" not in folder.name
     with pytest.raises(ValueError, match=r"nearest is shielded, .* is module:function"):
         arm_named("shieldet")
@@ -118,8 +119,8 @@ def test_a_table_of_ones_own_replaces_what_it_names(tmp_path):
     mine, slides = preset_in(str(file)), PRESETS["slides"]
     assert mine.ego == slides.ego._replace(response_time=0.5)
     assert mine.other == slides.other._replace(a_max_brake=9.0) and mine.source == "our lab"
-    config, _ = train.started(["--preset", str(file), "--other.mu", "0.3"])
-    assert train.resolve(config).other == mine.other._replace(mu=0.3)
+    config, _ = started(["--preset", str(file), "--other.mu", "0.3"])
+    assert resolve(config).other == mine.other._replace(mu=0.3)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +136,7 @@ def test_a_table_of_ones_own_replaces_what_it_names(tmp_path):
 def test_a_bad_table_is_refused_where_it_is_named(text, message, tmp_path, capsys):
     (tmp_path / "mine.yaml").write_text(text)
     with pytest.raises(SystemExit):
-        train.started(["--preset", "mine.yaml"])
+        started(["--preset", "mine.yaml"])
     assert f"--preset: mine.yaml: {message}" in capsys.readouterr().err
     for name in ("mine.yaml", "none.yaml", "slide"):
         with pytest.raises(ValueError, match=name):

@@ -17,9 +17,12 @@ from PIL import Image
 from places import ROOT
 from stable_baselines3 import PPO
 
-from rss_shield import train
+from rss_shield.command_line import Overrides
 from rss_shield.eval.metrics import METRICS, with_outcomes
-from rss_shield.shield.params import RSSParams
+from rss_shield.eval.suite.comparison.naming import run_name, valid_name
+from rss_shield.eval.suite.comparison.options import Config
+from rss_shield.eval.suite.comparison.reading import preset_name, resolve, started
+from rss_shield.shield.params import PRESETS, RSSParams
 
 SCRIPT = ROOT / "train.py"
 TINY = ["--total-timesteps", "64", "--seeds", "0", "--eval-episodes", "3", "--replay-episodes", "1", "--n-envs", "2"]
@@ -140,26 +143,23 @@ def test_help_shows_examples_and_every_option(monkeypatch, capsys):
     text = capsys.readouterr().out
     assert not stop.value.code
     assert "python train.py --resume" in text
-    script = runpy.run_path(str(SCRIPT))
-    for option in fields(script["Config"]):
+    for option in fields(Config):
         assert f"--{option.name.replace('_', '-')}" in text
-    assert [option.name for option in fields(script["Overrides"])] == list(RSSParams._fields)
+    assert [option.name for option in fields(Overrides)] == list(RSSParams._fields)
 
 
 def test_the_folder_is_named_after_the_options_that_are_not_defaults():
-    script = runpy.run_path(str(SCRIPT))
-    config, overrides = script["Config"], script["Overrides"]
-    assert script["run_name"](config()) == "highway-fast-v0"
-    assert script["run_name"](config(runs_dir=Path("elsewhere"), resume=True)) == "highway-fast-v0"
-    chosen = config(env_id="merge-v0", seeds=(1, 2), ego=overrides(response_time=0.5))
-    assert script["run_name"](chosen) == "merge-v0,seeds=1-2,ego.response_time=0.5"
-    configured = config(
+    assert run_name(Config()) == "highway-fast-v0"
+    assert run_name(Config(runs_dir=Path("elsewhere"), resume=True)) == "highway-fast-v0"
+    chosen = Config(env_id="merge-v0", seeds=(1, 2), ego=Overrides(response_time=0.5))
+    assert run_name(chosen) == "merge-v0,seeds=1-2,ego.response_time=0.5"
+    configured = Config(
         config={"lanes_count": 4, "reward_speed_range": [20, 30], "observation": {"type": "Kinematics"}}
     )
     name = "highway-fast-v0,config.lanes_count=4,config.reward_speed_range=20-30,config.observation.type=Kinematics"
-    assert script["run_name"](configured) == name
-    crossing = config(env_id="intersection-v0", entry="priority", intent="known", waiting="anywhere")
-    assert script["run_name"](crossing) == "intersection-v0,entry=priority,intent=known,waiting=anywhere"
+    assert run_name(configured) == name
+    crossing = Config(env_id="intersection-v0", entry="priority", intent="known", waiting="anywhere")
+    assert run_name(crossing) == "intersection-v0,entry=priority,intent=known,waiting=anywhere"
 
 
 @pytest.mark.parametrize(
@@ -167,22 +167,20 @@ def test_the_folder_is_named_after_the_options_that_are_not_defaults():
     [("highway-fast-v0", "simulator"), ("roundabout-v0", "simulator"), ("intersection-v0", "intersection")],
 )
 def test_the_environment_chooses_the_preset_and_single_parameters_replace_its_values(env_id, name):
-    script = runpy.run_path(str(SCRIPT))
-    config, overrides, preset = script["Config"], script["Overrides"], script["PRESETS"][name]
-    assert script["preset_name"](config(env_id=env_id)) == name
-    assert script["preset_name"](config(env_id=env_id, preset="slides")) == "slides"
-    wobbly = script["resolve"](config(env_id=env_id, ego=overrides(mu=0.5)))
+    preset = PRESETS[name]
+    assert preset_name(Config(env_id=env_id)) == name
+    assert preset_name(Config(env_id=env_id, preset="slides")) == "slides"
+    wobbly = resolve(Config(env_id=env_id, ego=Overrides(mu=0.5)))
     assert wobbly == preset._replace(ego=preset.ego._replace(mu=0.5))
 
 
 def test_given_parameters_replace_the_presets_and_nothing_else():
-    script = runpy.run_path(str(SCRIPT))
-    config, overrides, preset = script["Config"], script["Overrides"], script["PRESETS"]["simulator"]
-    assert script["resolve"](config()) == preset
-    braking = script["resolve"](config(other=overrides(a_min_brake=4.0)))
+    preset = PRESETS["simulator"]
+    assert resolve(Config()) == preset
+    braking = resolve(Config(other=Overrides(a_min_brake=4.0)))
     assert braking.other == preset.other._replace(a_min_brake=4.0)
     assert (braking.ego, braking.per_frame) == (preset.ego, True)
-    slow = script["resolve"](config(ego=overrides(response_time=0.5)))
+    slow = resolve(Config(ego=Overrides(response_time=0.5)))
     assert (slow.ego.response_time, slow.per_frame) == (0.5, False)
 
 
@@ -433,14 +431,14 @@ def test_to_resume_nothing_is_refused_unless_it_may_start(tmp_path, monkeypatch,
     assert stop.value.code == 2 and not list(tmp_path.iterdir())
     said = capsys.readouterr().err.strip()
     assert said.startswith(f"train.py: error: --resume: there is no run in {tmp_path / 'never'};")
-    config, _ = train.started(["--resume-or-start", *there])
+    config, _ = started(["--resume-or-start", *there])
     assert config.resume and not capsys.readouterr().err
 
 
 @pytest.mark.parametrize("seeds", ["", "a", "0 1.5"])
 def test_seeds_that_are_none_are_refused_by_the_command_that_was_called(seeds, capsys):
     with pytest.raises(SystemExit):
-        train.started(["--seeds", *seeds.split(), "--n-envs", "2"])
+        started(["--seeds", *seeds.split(), "--n-envs", "2"])
     expected = "is out of range: expected different whole numbers, 0 to 2**32 - 1, at least one"
     assert capsys.readouterr().err == f"rss-shield train: error: {f'--seeds {seeds}'.strip()} {expected}\n"
 
@@ -457,11 +455,10 @@ NAMED = [
 
 @pytest.mark.parametrize(("text", "name"), NAMED)
 def test_a_name_is_one_that_every_system_takes(text, name):
-    assert runpy.run_path(str(SCRIPT))["valid_name"](text) == name
+    assert valid_name(text) == name
 
 
 def test_long_names_are_shortened_and_stay_different():
-    valid_name = runpy.run_path(str(SCRIPT))["valid_name"]
     long = [valid_name("road," + ",".join(f"option{i}={i + last}" for i in range(40))) for last in range(3)]
     assert len(set(long)) == 3
     assert all(len(name) == 120 for name in long)

@@ -9,6 +9,9 @@ from typing import Any
 from rss_shield import train
 from rss_shield.eval.runs.experiment import training_words
 from rss_shield.eval.runs.store import Files
+from rss_shield.eval.suite.comparison.options import COMMAND
+from rss_shield.eval.suite.comparison.reading import resolve, started
+from rss_shield.eval.suite.comparison.trying import tried
 
 _KEPT = ("learning_curve.csv", "removal_curve.csv", "model.zip", "card.json", "README.md")
 
@@ -34,9 +37,9 @@ def check_trained(config: dict[str, Any]) -> None:
 
 
 def _tried(arguments: list[str]) -> None:
-    options, _ = train.started(arguments)
+    options, _ = started(arguments)
     try:
-        train.tried(options, train.resolve(options))
+        tried(options, resolve(options))
     except ValueError:
         raise
     except Exception as error:
@@ -61,4 +64,4 @@ def _quietly(call: Any, arguments: list[str]) -> None:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
             call(arguments)
     except SystemExit:
-        raise ValueError(said.getvalue().strip().removeprefix(f"{train.PROGRAM}: error: ")) from None
+        raise ValueError(said.getvalue().strip().removeprefix(f"{COMMAND}: error: ")) from None
