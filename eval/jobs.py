@@ -48,6 +48,9 @@ def run_jobs(jobs: Sequence[Job], n_workers: int) -> None:
     try:
         with children_ignore_interrupts():
             left = {pool.submit(_run_in_worker, i, job.work) for i, job in enumerate(jobs)}
+            # a pool is woken by what it is given before it starts the process for it: that of the last job would be
+            # watched from the next news on only, and if it was killed before these came, waited for without end
+            pool.submit(_nothing)
         while left:
             finished, left = wait(left, _TICK, FIRST_COMPLETED)
             _show(news, jobs, bars)
@@ -89,6 +92,10 @@ def _exit_after(ends: Connection) -> None:
     """A worker must not go on for ever when its parent was killed, nor to the end of its job when it must stop."""
     ends.poll(None)  # nothing is ever sent: it ends when the parent closes the other end, or is gone
     os._exit(1)
+
+
+def _nothing() -> None:
+    """A job that only wakes the pool."""
 
 
 def _run_in_worker(i: int, work: Callable[..., Any]) -> None:

@@ -221,6 +221,7 @@ def test_a_reward_is_one_finite_number_for_each_environment(name, message):
         rewards_by(function_named(f"brought:{name}"), np.ones(2), np.zeros(2), infos, np.zeros(2, bool))
 
 
+@pytest.mark.slow
 def test_an_agent_learns_from_it(tmp_path):
     train_in_blocks(
         ppo.learner(),

@@ -103,6 +103,7 @@ def test_thresholds_name_the_arms_that_pass(runs):
     assert harmless.endswith("nobody.")
 
 
+@pytest.mark.slow
 def test_the_page_and_its_figures_are_written(runs, tmp_path):
     page = agents.write(runs, tmp_path / "results")
     text = page.read_text()

@@ -223,6 +223,7 @@ def test_a_task_is_there_with_all_its_files_or_not_at_all(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == [task.key]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted((ROOT / "experiments").glob("*.*")), ids=lambda path: path.name)
 def test_the_experiments_of_the_documentation_can_be_run(path):
     experiment = read_experiment(path)

@@ -80,10 +80,13 @@ def kill_the_worker(progress):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_worker_that_is_killed_is_an_error_and_stops_the_others_at_once():
+@pytest.mark.parametrize("killed", [0, 1], ids=["the first worker", "the last worker"])
+def test_a_worker_that_is_killed_is_an_error_and_stops_the_others_at_once(killed):
+    jobs = [Job("busy", 2, "thing", sleep_for_ever)]
+    jobs.insert(killed, Job("is killed", 2, "thing", kill_the_worker))
     began = time.perf_counter()
     with pytest.raises(BrokenProcessPool):
-        run_jobs([Job("is killed", 2, "thing", kill_the_worker), Job("busy", 2, "thing", sleep_for_ever)], 2)
+        run_jobs(jobs, 2)
     assert time.perf_counter() - began < 20
 
 

@@ -154,6 +154,7 @@ def test_an_interval_of_a_rate_stays_a_rate(crashes):
     assert 0 <= row["seed_low"] <= row["low"] <= row["value"] <= row["high"] <= row["seed_high"] <= 1
 
 
+@pytest.mark.slow
 def test_the_interval_over_seeds_covers_what_training_gives_on_average():
     rng, covered = np.random.default_rng(5), 0
     for _ in range(60):

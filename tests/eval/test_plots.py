@@ -40,6 +40,7 @@ def assert_is_a_picture(path):
         assert len(np.unique(np.asarray(image.convert("L")))) > 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [0, 1, 100])
 def test_learning_curves_of_any_length_are_drawn(n, tmp_path):
     plot_learning_curve(a_curve(n), tmp_path, "a road")
@@ -47,6 +48,7 @@ def test_learning_curves_of_any_length_are_drawn(n, tmp_path):
     assert (tmp_path / "learning_curve.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("episodes", [some_episodes(), episodes_of(["", ""])], ids=["crashes", "no crash"])
 def test_blame_is_drawn(episodes, tmp_path):
     plot_blame(episodes, tmp_path, "a road")
@@ -54,6 +56,7 @@ def test_blame_is_drawn(episodes, tmp_path):
     assert (tmp_path / "blame.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 def test_the_same_data_give_the_same_files(tmp_path):
     pictures = []
     for name in ("first", "second"):

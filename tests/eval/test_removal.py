@@ -55,6 +55,7 @@ def test_seeds_are_pooled():
     assert pooled.high - pooled.value == pytest.approx(1.959964 * np.sqrt(8 / 7 / 8))
 
 
+@pytest.mark.slow
 def test_the_figure_has_every_arm(tmp_path):
     for arm in ("unshielded", "shielded"):
         folder = tmp_path / f"{arm}-seed0"
@@ -87,6 +88,7 @@ def summary():
     return summarise(pd.concat([episodes_of(blames, *cell) for *cell, blames in cells], ignore_index=True))
 
 
+@pytest.mark.slow
 def test_a_point_of_the_frontier_is_an_arm(tmp_path):
     points = frontier.points_of(summary())
     assert set(points.index.get_level_values("arm")) == {"unshielded", "shielded"}

@@ -65,6 +65,7 @@ def test_nothing_is_rounded_to_a_limit_that_it_is_not(number, digits, text):
     assert rounded(number, digits, (0.0, 100.0)) == text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("crashes", "n", "text"),
     # z^2 = 3.84: 3.84 / 2003.84 = 0.19 %; 3.84 / 9003.84 = 0.043 %; 1 of 2000: [0.0088, 0.28] %

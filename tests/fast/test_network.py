@@ -11,6 +11,7 @@ _is_far = numba.njit(lambda lane, x, y, across, along: is_far(lane, x, y, across
 _distance = numba.njit(lambda lane, s, lateral: distance(lane, s, lateral))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("env_id", ["intersection-v0", "roundabout-v0", "merge-v0"])
 def test_who_is_far_from_a_lane_is_so_in_its_coordinates(env_id):
     env = rss_shield.make(env_id)

@@ -72,6 +72,7 @@ def test_the_ego_gives_way_on_its_left_turn_but_not_to_the_opposite_one(paths):
     assert others["o2", "o3"] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speeds", [(3.0, 9.5), (8.0, 5.5)])
 def test_cars_that_overlap_are_in_conflict(paths, speeds):
     """Two cars are driven along every pair of paths at speeds that the tables were not made with."""
@@ -120,6 +121,7 @@ def test_the_next_place_where_nobody_may_wait_is_the_first_one_ahead(paths):
     assert ends > 0
 
 
+@pytest.mark.slow
 def test_ring_roads_are_left_at_every_exit_and_have_the_right_of_way():
     ring = junction("roundabout-v0")
     sinks = {walk[-1][1] for walk in ring.walks}

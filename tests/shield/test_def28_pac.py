@@ -44,6 +44,7 @@ def test_it_is_pac_if_no_share_is_above_what_is_admitted():
     assert not is_pac(np.array([0.0, 0.0, 0.002]), delta)
 
 
+@pytest.mark.slow
 def test_its_estimate_covers_the_true_shares_as_often_as_it_says():
     # decisions lose 0.5, 2 or 20 in 5, 1 and 0.2 per cent of cases: beyond the levels in 6.2, 1.2 and 0.2 per cent
     rng = np.random.default_rng(2)

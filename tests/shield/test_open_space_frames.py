@@ -185,6 +185,7 @@ def test_the_rear_car_has_to_brake_for_the_one_that_drives_ahead():
 # ---------------------------------------------------------------- the simulator's test of contact
 
 
+@pytest.mark.slow
 def test_what_is_apart_is_never_flagged_by_the_simulators_test_of_contact():
     """Two boxes that keep their widened distance for a frame: highway-env sees no contact coming, however they move."""
     rng = np.random.default_rng(3)
