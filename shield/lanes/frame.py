@@ -122,12 +122,15 @@ def look_ahead(road, x, y, speed, half_length, dt):
 
 
 _AHEAD = 6  # frames
+_LEAST = 1e-3  # chord of a car that stands [m]
+_SHORT, _LONG = 0.1, 1.0  # one that is too short to tell a bend by, and one that is not [m]
 _FAST = 1.8  # half wheelbases per frame; from 2 on `idle` counts, and a car may become faster during the frame
 
 
 @rare
 def _look_ahead(road, x, y, speed, half_length, dt):
-    distance = max(speed * dt, 1e-3)
+    way = speed * dt
+    distance = way if abs(way) > _LEAST else np.copysign(_LEAST, way)
     x_next, y_next, heading, drift, turned = _chord(road, x, y, distance)
     idle = _idle(road, x_next, y_next, distance, half_length) if distance >= _FAST * half_length else 0.0
     if turned == 0.0:
@@ -135,7 +138,21 @@ def _look_ahead(road, x, y, speed, half_length, dt):
     after = heading + turned
     _, _, k, _ = nearest_piece(road, x, y)
     _, rear = follow(road, k, x_next - half_length * np.cos(after), y_next - half_length * np.sin(after))
-    return Bend(2.0 * drift / distance, wrap_angle(rear - after), turned, idle)
+    return Bend(_curvature(road, x, y, distance, drift, half_length), wrap_angle(rear - after), turned, idle)
+
+
+@inner
+def _curvature(road, x, y, distance, drift, half_length):
+    """Of the lane along a chord, whose drift is known [1/m].
+
+    Where pieces do not quite meet, a car that hardly moves sees a step of a millimetre as a bend that no car can take:
+    it looks farther, and no bend is tighter than its wheelbase.
+    """
+    if abs(distance) >= _SHORT:
+        return 2.0 * drift / distance
+    farther = np.copysign(_LONG, distance)
+    drift = _chord(road, x, y, farther)[3]
+    return min(max(2.0 * drift / farther, -0.5 / half_length), 0.5 / half_length)
 
 
 @inner

@@ -65,6 +65,27 @@ def test_what_lies_ahead_on_an_arc():
     assert look_ahead(STRAIGHT, 50.0, 0.0, 29.0, 2.5, DT) == (0.0, 0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("speed", [-0.4, -0.1, 0.0, 0.1, 0.4])
+def test_who_hardly_moves_sees_the_bend_and_not_the_millimetre_by_which_pieces_do_not_meet(speed):
+    half = on_arc(50.0)
+    step = np.array([-np.sin(half[2]), np.cos(half[2])]) * 1e-3  # to the right
+    road = make_road([(0.0, 0.0, 0.0, 1.0 / R, 50.0, 0.0), (*(half[:2] + step), half[2], 1.0 / R, 250.0, 50.0)])
+    for s in np.arange(49.99, 50.01, 1e-4):
+        x, y, _ = on_arc(s)
+        # over a metre a step of a millimetre is a bend of 500 m
+        assert abs(look_ahead(road, x, y, speed, 2.5, DT).curvature) <= 1.0 / R + 1.0 / 500.0 + 1e-4
+    x, y, _ = on_arc(40.0)
+    assert look_ahead(road, x, y, speed, 2.5, DT).curvature == pytest.approx(1.0 / R, rel=1e-3)
+
+
+def test_what_lies_behind_counts_for_who_backs_up():
+    road = make_road([(0.0, 0.0, 0.0, 1.0 / R, 50.0, 0.0), (*on_arc(50.0), 0.0, 250.0, 50.0)])
+    x, y, _ = on_arc(49.9)
+    assert look_ahead(road, x, y, -2.0, 2.5, DT).curvature == pytest.approx(1.0 / R, rel=1e-3)
+    assert look_ahead(road, x, y, -2.0, 2.5, DT).turned == pytest.approx(-0.4 / R, rel=1e-3)
+    assert look_ahead(road, x, y, 2.0, 2.5, DT).curvature < 0.9 / R
+
+
 def test_a_car_at_the_idle_heading_keeps_to_the_lane_and_turns_with_it():
     x, y, along = on_arc(50.0)
     bend, gain = look_ahead(ARC, x, y, 29.0, 2.5, DT), 29.0 * DT / 2.5
