@@ -65,6 +65,13 @@ def carried_over(rows: np.ndarray, before: list, now: list) -> np.ndarray:
     return result
 
 
+def _living(value: Any) -> Any:
+    """A record that can be written to, of one that comes from a pickle; anything else as it is."""
+    if isinstance(value, np.void):
+        return np.array([value], value.dtype)[0]
+    return tuple(map(_living, value)) if type(value) is tuple else value
+
+
 class ShieldedEgo:
     """The shield on one controlled vehicle. It takes the place of the vehicle's `act`.
 
@@ -115,6 +122,10 @@ class ShieldedEgo:
         self.cruise: float | None = None  # speed to go back to after braking, where the agent has no say in it [m/s]
         self.senses: Senses | None = None  # what it sees is what is there; else `judge` sees that
         vehicle.act = self.act
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Of a pickle, whose records would say that they take what is written to them, and forget it."""
+        self.__dict__ = {name: _living(value) for name, value in state.items()}
 
     def go_on_from(self, former: "ShieldedEgo") -> None:
         """Take the place of another car: what counts since reset goes on."""

@@ -105,6 +105,34 @@ def test_a_clone_carries_its_own_shield_along(clone):
     assert original_trace[-1][2] > 0.0
 
 
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["copy", "pickle"])
+@pytest.mark.parametrize(
+    ("env_id", "options"),
+    [
+        ("highway-fast-v0", {}),
+        ("highway-fast-v0", {"shield": "monitor"}),
+        ("highway-fast-v0", {"shield": "monitor", "sensing": {"latency": 0.2}}),
+        ("intersection-v0", {"shield": "monitor"}),
+        ("crosswalk-v0", {}),
+        ("parking-v0", {}),
+        ("intersection-multi-agent-v0", {}),
+    ],
+)
+def test_a_clone_tells_what_its_original_tells(clone, env_id, options):
+    env = make(env_id, **options)
+    env.reset(seed=3)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(12)]
+    for action in actions[:3]:
+        env.step(action)
+    cloned = clone(env)
+    for action in actions[3:]:
+        *_, over, late, info = env.step(action)
+        assert str(cloned.step(action)[-1]) == str(info)
+        if np.any(over) or np.any(late):
+            break
+
+
 def test_vehicles_are_shielded_anew_after_every_reset():
     env = make_shielded()
     for seed in (0, 1):
