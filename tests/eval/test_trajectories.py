@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from rss_shield.cli import main
-from rss_shield.eval.suite.judge.trajectories import Format, read_csv, read_lanes, straight_lanes
+from rss_shield.eval.suite.judge.trajectories import FORMATS, Format, read_csv, read_lanes, straight_lanes
 
 DT, FOOT = 0.1, 0.3048
 TIME = np.arange(41) * DT
@@ -131,8 +131,10 @@ def test_formats_and_units_are_known_ones(tmp_path):
     path = written(rows(t=TIME, x=X, y=Y), tmp_path)
     with pytest.raises(ValueError, match="format = 'interaction': expected one of plain, highd, ngsim"):
         read_csv(path, "interaction")
-    with pytest.raises(ValueError, match="unit of x = 'yards': expected one of m, ft"):
+    with pytest.raises(ValueError, match="unit of x = 'yards': expected a length in m, ft"):
         read_csv(path, Format(units={"x": "yards"}))
+    with pytest.raises(ValueError, match="unit of width = 'deg': expected a length"):
+        read_csv(path, Format(units={"width": "deg"}))  # of which the file has none
 
 
 def test_lanes_come_from_a_file_or_from_offsets(tmp_path):
@@ -183,7 +185,18 @@ def refused(capsys, *arguments):
         ("--lanes-at nan", "--lanes-at nan: expected finite numbers"),
         ("--dt nan", "--dt nan: expected a number > 0"),
         ("--dt 0", "--dt 0: expected a number > 0"),
-        ("--dt 5", "dt = 5: expected > 0 and <= 4 s"),
+        (
+            "--dt 5",
+            "dt = 5: expected >= 8e-07 s, which makes 5000000 samples, and <= 4 s, which is how long the log is",
+        ),
+        ("--dt 1e-9", "log.csv: dt = 1e-09: expected >= 8e-07 s"),
+        ("--units x=s", "unit of x = 's': expected a length in m, ft, km"),
+        ("--units speed=deg", "unit of speed = 'deg': expected a speed in m/s, km/h, mph, ft/s"),
+        ("--units t=m", "unit of t = 'm': expected a time in s, ms, us"),
+        ("--units t=frame", "unit of t = 'frame': expected a time in s, ms, us"),
+        ("--units kind=m", "unit of kind = 'm': expected none, but of t, heading"),
+        ("--units x=ft,x=m", "--units x=ft,x=m: x is there 2 times: expected once"),
+        ("--columns x=east,y=north,x=px", "x is there 2 times: expected once"),
         ("--response-time -1", "--response-time -1: expected a number > 0 and <= 60"),
         ("--preset carlo", "preset = 'carlo': expected one of"),
     ],
@@ -210,6 +223,19 @@ def test_what_is_wrong_in_a_file_is_named(tmp_path, capsys, name, text, message)
     (tmp_path / name).write_text(text)
     said = refused(capsys, "judge", str(tmp_path / name))
     assert message in said and "np." not in said
+
+
+def test_times_that_are_far_apart_make_no_more_samples_than_there_is_room_for(tmp_path):
+    table = rows(t=np.append(TIME[:-1] * 1e-8, 4e9), x=X, y=Y)
+    with pytest.raises(ValueError, match="in steps of 1e-09 s: expected 5000000 samples at most; give dt"):
+        read_csv(written(table, tmp_path))
+
+
+def test_frames_may_be_told_in_seconds(tmp_path):
+    """highD counts frames of 25 Hz; who has put times into that column says so."""
+    table = rows(frame=TIME, x=X, y=Y).assign(width=5.0, height=2.0)
+    known = FORMATS["highd"]
+    assert read_csv(written(table, tmp_path), known._replace(units={"t": "s"})).dt == pytest.approx(DT)
 
 
 def test_options_of_csv_files_are_for_these_only(capsys):

@@ -11,6 +11,7 @@ from rss_shield.eval.suite.judge.findings import json_of, pair_frames, text_of
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.risk import risk_lines, risk_table
 from rss_shield.eval.suite.judge.trajectories import FORMATS, Format, read_csv, read_lanes, straight_lanes
+from rss_shield.eval.suite.judge.units import check_units
 from rss_shield.eval.suite.own_table import KNOWN_PRESETS, preset_in
 from rss_shield.shield.params import Preset
 from rss_shield.shield.trace import Lane, Trace, load
@@ -155,6 +156,7 @@ def _format(options: argparse.Namespace) -> Format:
             if name not in Format._fields[:10]:
                 raise ValueError(f"{option} {name}=...: expected one of {', '.join(Format._fields[:10])}")
     known = known._replace(**names, units={**known.units, **units})
+    check_units(known.units, known.frame_rate)
     if options.y:
         known = known._replace(y_up=options.y == "up")
     return known._replace(point=options.point) if options.point else known
@@ -164,7 +166,11 @@ def _pairs(option: str, text: str) -> dict[str, str]:
     pairs = [pair.split("=", 1) for pair in text.split(",") if pair]
     if any(len(pair) != 2 for pair in pairs):
         raise ValueError(f"{option} {text}: expected FIELD=VALUE, separated by commas")
-    return {name.strip(): value.strip() for name, value in pairs}
+    names = [name.strip() for name, _ in pairs]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"{option} {text}: {twice} is there {names.count(twice)} times: expected once")
+    return {name: value.strip() for name, (_, value) in zip(names, pairs, strict=True)}
 
 
 def _lanes(path: Path, options: argparse.Namespace) -> tuple[Lane, ...]:

@@ -53,10 +53,10 @@ def danger_line(judgement: Judgement, danger: Danger) -> str:
         line += f", owed braking from {danger.brakes_from:.2f} s"
     if danger.stops_from < danger.end:
         line += f", owed no approach from {danger.stops_from:.2f} s"
+    sure = "" if danger.is_sure else ", not sure"
     if danger.duty:
-        sure = "" if danger.is_sure else ", not sure"
         return f"{line}: {danger.duty} by {danger.excess:.2f} from {danger.broken_at:.2f} s{sure}"
-    return f"{line}: kept its duty"
+    return f"{line}: kept its duty{sure}"
 
 
 def blame_line(judgement: Judgement, blame: Blame) -> str:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rss_shield.eval.suite.judge.directions import directions, roads_of
 from rss_shield.eval.suite.judge.lanes import Seen, see_all, table_of
 from rss_shield.eval.suite.judge.plans import see_junction
 from rss_shield.eval.suite.judge.smoothing import EXACT, SURE, Noise, filled_in
@@ -28,7 +29,7 @@ class Danger(NamedTuple):
     duty: str  # that it broke first, "" = none
     excess: float  # by how much, in the unit that the duty says
     broken_at: float  # when, NaN = never [s]
-    is_sure: bool  # more than noise explains; True where nothing was broken
+    is_sure: bool  # neither noise nor the direction of a road that is not known makes it broken, or kept
 
 
 class Blame(NamedTuple):
@@ -39,7 +40,7 @@ class Blame(NamedTuple):
     at_fault: tuple[int, ...]  # users who broke a duty; empty = see `verdict`
     verdict: str  # "first", "second", "both", "inherited", "none"
     views: dict[int, dict[str, Any]]  # by user: what its own view says, as a shield's `blame_evidence`
-    is_sure: bool
+    is_sure: bool  # the same without what noise explains, and on every road that the log may have been on
 
 
 @dataclass(frozen=True)
@@ -85,33 +86,50 @@ def judge_trace(
     table = table_of(trace, params, rules)
     chosen = list(range(len(trace.users.ids))) if users is None else users
     if trace.meta.get("scheme") == "plans":
-        blames, notes = see_junction(trace, table, users)
-        return Judgement(trace, table, {}, (), _joined(trace, blames, blames), noise, notes)
-    seen = see_all(trace, table, chosen)
-    sure = seen if noise == EXACT else see_all(trace, table, chosen, noise)
-    dangers = [one for i in chosen for one in _dangers(trace, table, i, seen[i], sure[i])]
-    views = [{(i, j): view for i in chosen for j, view in _views(trace, one[i]).items()} for one in (seen, sure)]
+        views, notes = see_junction(trace, table, users)
+        return Judgement(trace, table, {}, (), _joined(trace, views, views), noise, notes)
+    sights = [_sight(road, table, chosen, noise) for road in roads_of(trace)]
+    dangers = [one for i in chosen for one in _dangers(trace, table, i, sights)]
+    blames, *elsewhere = [
+        _joined(trace, *({(i, j): view for i in chosen for j, view in _views(trace, one[i]).items()} for one in sight))
+        for sight in sights
+    ]
     return Judgement(
         trace,
         table,
-        seen,
+        sights[0].seen,
         tuple(sorted(dangers, key=lambda one: (one.start, one.user, one.partner))),
-        _joined(trace, *views),
+        _doubted(blames, elsewhere),
         noise,
         _notes(trace, noise),
     )
 
 
-def _dangers(trace: Trace, table: Table, i: int, seen: Seen, sure: Seen) -> list[Danger]:
-    """Stretches of danger of one user. Of duties those count that were surely broken, or else those that seem to be."""
+class _Sight(NamedTuple):
+    """What users see on one road, by the user."""
+
+    seen: dict[int, Seen]
+    sure: dict[int, Seen]  # what noise explains counts as kept
+
+
+def _sight(trace: Trace, table: Table, users: list[int], noise: Noise) -> _Sight:
+    seen = see_all(trace, table, users)
+    return _Sight(seen, seen if noise == EXACT else see_all(trace, table, users, noise))
+
+
+def _dangers(trace: Trace, table: Table, i: int, sights: list[_Sight]) -> list[Danger]:
+    """Stretches of danger of one user. Of duties those count that were surely broken, or else those that seem to be.
+
+    They are those on the first road; on the others the same must be broken, or kept, for it to be sure.
+    """
     own = table.ego if i in trace.ego_users else table.other
-    found = []
+    seen, found = sights[0].seen[i], []
     for j in np.flatnonzero(seen.frames["dangerous"].any(axis=0)):
         frames = seen.frames[:, j]
         for start, end in stretches(frames["dangerous"]):
-            part, surely = frames[start:end], sure.frames[start:end, j]
-            is_sure = bool((surely["ego_broke"] != KEPT).any())
-            judged = surely if is_sure else part
+            part, surely = frames[start:end], [one.sure[i].frames[start:end, j] for one in sights]
+            is_broken = [bool((frames["ego_broke"] != KEPT).any()) for frames in surely]
+            judged = surely[0] if is_broken[0] else part
             broken = np.flatnonzero(judged["ego_broke"] != KEPT)
             duty = int(judged["ego_broke"][broken[0]]) if len(broken) else KEPT
             excess = float(judged["ego_excess"][judged["ego_broke"] == duty].max()) if len(broken) else 0.0
@@ -130,7 +148,7 @@ def _dangers(trace: Trace, table: Table, i: int, seen: Seen, sure: Seen) -> list
                     DUTIES[duty],
                     excess,
                     float(trace.time[start + broken[0]]) if len(broken) else np.nan,
-                    duty == KEPT or is_sure,
+                    not any(is_broken) if duty == KEPT else all(is_broken),
                 )
             )
     return found
@@ -181,6 +199,16 @@ def _joined(trace: Trace, seen: Views, sure: Views) -> tuple[Blame, ...]:
     return tuple(sorted(blames, key=lambda blame: blame.time))
 
 
+def _doubted(blames: tuple[Blame, ...], elsewhere: list[tuple[Blame, ...]]) -> tuple[Blame, ...]:
+    """Contacts with those only left sure that are surely the same on every other road that the log may have been on."""
+    for others in elsewhere:
+        same = {(one.users, one.at_fault, one.verdict) for one in others if one.is_sure}
+        blames = tuple(
+            one._replace(is_sure=one.is_sure and (one.users, one.at_fault, one.verdict) in same) for one in blames
+        )
+    return blames
+
+
 def _at_fault(views: Views, i: int, j: int) -> set[int]:
     """Who broke a duty is known best from the own view, commands included; else by the view of the other."""
     found = {a for a, b in ((i, j), (j, i)) if (a, b) in views and views[a, b]["ego_duty"]}
@@ -206,5 +234,11 @@ def _notes(trace: Trace, noise: Noise) -> tuple[str, ...]:
             "where the log ends and that of cars"
         )
     if not trace.lanes:
-        notes.append("the log has no lanes: everybody is taken to drive along one straight road")
+        best, *others = directions(trace)
+        doubt = np.degrees(max((abs(one - best) for one in others), default=0.0))
+        off = f", within {doubt:.1f} degrees: what depends on it is marked as not sure" if others else ""
+        notes.append(
+            "the log has no lanes: everybody is taken to drive along one straight road, whose direction is estimated "
+            f"from headings{off}; lanes of a CSV file are given by --lanes FILE, or along x by --lanes-at Y,..."
+        )
     return tuple(notes)

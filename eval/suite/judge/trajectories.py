@@ -9,16 +9,14 @@ import numpy as np
 import pandas as pd
 
 from rss_shield.eval.suite.judge.smoothing import derivative
+from rss_shield.eval.suite.judge.units import check_units, factor_of
 from rss_shield.shield.trace import KINDS, Lane, Trace, straight_lane, users_of
 
 LENGTH, WIDTH = 4.5, 1.8  # of a user whose size the log does not say [m]
 _SLOW = 0.5  # whoever is slower keeps the heading that it had [m/s]
 _OFF_GRID = 0.2  # of a time step: samples may be this far from where they should be
-_FOOT = 0.3048  # [m]
-UNITS = {
-    **{"m": 1.0, "ft": _FOOT, "km": 1000.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "frame": 1.0},
-    **{"rad": 1.0, "deg": np.pi / 180.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 1609.344 / 3600.0, "ft/s": _FOOT},
-}
+MOST = 10_000_000  # poses of all users on all samples that are made of a log ...
+MOST_OF_ROW = 40  # ... or as many of each row, if that is more
 
 
 class Format(NamedTuple):
@@ -34,7 +32,7 @@ class Format(NamedTuple):
     width: str = "width"
     kind: str = "kind"
     lane: str = "lane"
-    units: Mapping[str, str] = {}  # by field: see UNITS; SI where nothing is said
+    units: Mapping[str, str] = {}  # by field: see `units`; SI where nothing is said
     y_up: bool = True  # y grows to the left of x, as in mathematics
     point: str = "centre"  # what x and y are of: "centre", "front" (its middle) or "corner" (the least x and y)
     frame_rate: float = 0.0  # of times that are counted in frames [Hz]
@@ -78,12 +76,13 @@ def read_csv(
       dt: time between two samples: positions are interpolated to it [s]; None = as in the file.
 
     Raises:
-      ValueError: a column that is needed is not there, a unit that is none, a value that is no number, a row that is
-        there twice, or times that are not evenly spaced.
+      ValueError: a column that is needed is not there, a unit of something else, a value that is no number, a row that
+        is there twice, times that are not evenly spaced, or too many samples.
     """
     known = FORMATS.get(columns) if isinstance(columns, str) else columns
     if known is None:
         raise ValueError(f"format = {columns!r}: expected one of {', '.join(FORMATS)}")
+    check_units(known.units, known.frame_rate)
     rows = _rows(path)
     for name in ("id", "t", "x", "y"):
         if getattr(known, name) not in rows.columns:
@@ -100,7 +99,7 @@ def read_csv(
             table[name] = _column(path, rows, known, name)
             if name in ("length", "width") and not (table[name] > 0.0).all():
                 _refuse_value(path, rows, getattr(known, name), ~(table[name] > 0.0), "a number > 0")
-    if known.frame_rate:
+    if known.frame_rate and known.units.get("t", "frame") == "frame":
         table["t"] /= known.frame_rate
     if known.y_up:
         table["y"] *= -1.0
@@ -110,12 +109,8 @@ def read_csv(
     if twice.any():
         user, t = table.loc[twice, "id"].iloc[0], table.loc[twice, "t"].iloc[0]
         raise ValueError(f"{path}: {known.id} = {user} is there twice at {known.t} = {t:g}: expected once")
-    step = _step(path, table["t"].to_numpy()) if dt is None else dt
-    start, end = float(table["t"].min()), float(table["t"].max())
-    if not 0.0 < step <= end - start:
-        raise ValueError(f"{path}: dt = {step:g}: expected > 0 and <= {end - start:g} s, which is how long the log is")
-    time = start + np.arange(round((end - start) / step) + 1) * step
     ids = list(dict.fromkeys(table["id"]))
+    step, time = _samples(path, table["t"].to_numpy(), dt, len(ids))
     state = {name: np.full((len(time), len(ids)), np.nan) for name in ("x", "y", "heading", "speed")}
     length, width = np.full(len(ids), LENGTH), np.full(len(ids), WIDTH)
     for i, (_, own) in enumerate(table.groupby("id", sort=False)):
@@ -139,13 +134,11 @@ def read_csv(
 
 def _column(path: str | Path, rows: pd.DataFrame, known: Format, name: str) -> pd.Series:
     """A column in SI units."""
-    column, unit = getattr(known, name), known.units.get(name)
-    if unit is not None and unit not in UNITS:
-        raise ValueError(f"unit of {name} = {unit!r}: expected one of {', '.join(UNITS)}")
+    column = getattr(known, name)
     values = pd.to_numeric(rows[column], errors="coerce")
     if not np.isfinite(values).all():
         _refuse_value(path, rows, column, ~np.isfinite(values), "a finite number")
-    return values * (UNITS[unit] if unit else 1.0)
+    return values * factor_of(name, known.units.get(name))
 
 
 def _rows(path: str | Path) -> pd.DataFrame:
@@ -170,6 +163,22 @@ def _refuse_value(path: str | Path, rows: pd.DataFrame, column: str, wrong: Any,
         raise ValueError(f"{path}: row {row + 2} has no {column}: expected {expected}, and {len(rows.columns)} values")
     shown = repr(value) if isinstance(value, str) else value  # no names of types
     raise ValueError(f"{path}: {column} = {shown} in row {row + 2}: expected {expected}")
+
+
+def _samples(path: str | Path, times: np.ndarray, dt: float | None, users: int) -> tuple[float, np.ndarray]:
+    """Time between two samples, given or as in the file, and the times of all `[T]` [s]."""
+    step = _step(path, times) if dt is None else dt
+    start, long = float(times.min()), float(np.ptp(times))
+    most = max(MOST, MOST_OF_ROW * len(times)) // users
+    least = float(f"{long / most:.2g}")  # as it is told
+    if dt is not None and not least <= dt <= long:
+        raise ValueError(
+            f"{path}: dt = {dt:g}: expected >= {least:g} s, which makes {most} samples, and <= {long:g} s, "
+            "which is how long the log is"
+        )
+    if long / step > most:
+        raise ValueError(f"{path}: {long:g} s in steps of {step:g} s: expected {most} samples at most; give dt")
+    return step, start + np.arange(round(long / step) + 1) * step
 
 
 def _step(path: str | Path, times: np.ndarray) -> float:

@@ -18,27 +18,26 @@ from rss_shield.envs.roads.lanes import (
     tightest,
 )
 from rss_shield.envs.roads.traced_lane import TracedLane
+from rss_shield.eval.suite.judge.directions import directions, lane_along
 from rss_shield.shield.geometry import box_of
 from rss_shield.shield.lanes.frame import look_ahead, same_frame, to_lane_frame_all
 from rss_shield.shield.lanes.judge import Log
 from rss_shield.shield.lanes.pair import ROAD_USER
 from rss_shield.shield.params import Table
-from rss_shield.shield.trace import Lane, Trace, straight_lane, stretches
-
-_OPEN = 1000.0  # a log without lanes has one along its users, and so much longer at either end [m]
+from rss_shield.shield.trace import Lane, Trace, stretches
 
 
 class World:
     """The road network of a trace, and where everybody is on it.
 
     Args:
-      trace: `Trace`. Without lanes everybody is taken to drive along one straight road, in the direction in which
-        most of them go.
+      trace: `Trace`. Without lanes everybody is taken to drive along one straight road, in the most likely one of
+        `directions`.
     """
 
     def __init__(self, trace: Trace) -> None:
         self.trace = trace
-        self.lanes = trace.lanes or (_lane_along(trace),)
+        self.lanes = trace.lanes or (lane_along(trace, directions(trace)[0]),)
         self.network, self.indices = _network(trace, self.lanes)
         self.number = {lane.id: k for k, lane in enumerate(self.lanes)}
         self.bend = tightest(self.network)
@@ -215,21 +214,3 @@ def traced_network(network: RoadNetwork, lanes: tuple[Lane, ...]) -> list[LaneIn
         road.append(TracedLane(lane))
         indices.append((start, end, len(road) - 1))
     return indices
-
-
-def _lane_along(trace: Trace) -> Lane:
-    """One straight lane along which most users of a log without lanes drive, as wide as they are apart."""
-    u = trace.users
-    there = u.present
-    doubled = 2.0 * u.heading[there]  # who drives the other way is on the same road
-    heading = 0.5 * float(np.arctan2(np.sin(doubled).sum(), np.cos(doubled).sum()))
-    if (np.cos(u.heading[there] - heading) * np.abs(u.speed[there])).sum() < 0.0:
-        heading += np.pi
-    x, y = u.x[there], u.y[there]
-    along, across = x * np.cos(heading) + y * np.sin(heading), -x * np.sin(heading) + y * np.cos(heading)
-    middle = 0.5 * (across.min() + across.max())
-    ends = [
-        (s * np.cos(heading) - middle * np.sin(heading), s * np.sin(heading) + middle * np.cos(heading))
-        for s in (along.min() - _OPEN, along.max() + _OPEN)
-    ]
-    return straight_lane("road", ends[0], ends[1], width=float(np.ptp(across)) + 4.0)
