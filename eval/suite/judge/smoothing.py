@@ -17,7 +17,7 @@ from rss_shield.shield.verdicts import DUTIES
 
 WINDOW = 1.1  # length of the fit: long enough for NGSIM's noise, short enough to see a braking begin [s]
 ORDER = 3
-SURE = 2.0  # standard deviations beyond which a broken duty is no noise
+SURE = 3.0  # standard deviations beyond which a broken duty is no noise: a log has many samples
 
 
 class Noise(NamedTuple):
@@ -60,31 +60,36 @@ def derivative(values: np.ndarray, dt: float, order: int) -> np.ndarray:
 
 
 def filled_in(trace: Trace) -> tuple[Trace, Noise]:
-    """The trace with accelerations where it has none, and how exact they are."""
+    """The trace with accelerations where it has none, and how exact they are.
+
+    Positions of whom that is done for are smoothed as well: from one sample to the next noise moves everybody across
+    the lane faster than any car drives.
+    """
     u = trace.users
     unknown = np.isnan(u.acceleration) & u.present
     unknown[-1] = False  # nobody knows what follows
     if not unknown.any():
         return trace, EXACT
-    acceleration = u.acceleration.copy()
+    acceleration, x, y = u.acceleration.copy(), u.x.copy(), u.y.copy()
     along: list[np.ndarray] = []
     across: list[np.ndarray] = []
     for i in np.flatnonzero(unknown.any(axis=0)):
         for start, end in stretches(u.present[:, i]):
-            x, y = u.x[start:end, i], u.y[start:end, i]
+            raw = u.x[start:end, i], u.y[start:end, i]
             cos, sin = np.cos(u.heading[start:end, i]), np.sin(u.heading[start:end, i])
-            forward = derivative(x, trace.dt, 2) * cos + derivative(y, trace.dt, 2) * sin
+            forward = derivative(raw[0], trace.dt, 2) * cos + derivative(raw[1], trace.dt, 2) * sin
             v = u.speed[start:end, i]  # the fit goes on braking a little after a car has come to rest
             forward[:-1] = np.maximum(forward[:-1], (np.minimum(v[1:], 0.0) - v[:-1]) / trace.dt)
             mine = unknown[start:end, i]
             acceleration[start:end, i][mine] = forward[mine]
+            smooth = derivative(raw[0], trace.dt, 0), derivative(raw[1], trace.dt, 0)
+            x[start:end, i], y[start:end, i] = smooth
             if end - start > full_window(trace.dt):  # what a shorter fit leaves over is another share of the noise
-                dx, dy = x - derivative(x, trace.dt, 0), y - derivative(y, trace.dt, 0)
+                dx, dy = raw[0] - smooth[0], raw[1] - smooth[1]
                 along.append(dx * cos + dy * sin)
                 across.append(dy * cos - dx * sin)
-    return trace.replaced(users=replace(u, acceleration=acceleration)), max(
-        noise_of(along, trace.dt), noise_of(across, trace.dt)
-    )
+    noise = max(noise_of(along, trace.dt), noise_of(across, trace.dt))
+    return trace.replaced(users=replace(u, acceleration=acceleration, x=x, y=y)), noise
 
 
 def noise_of(left: list[np.ndarray], dt: float) -> Noise:
