@@ -19,7 +19,7 @@ from rss_shield.eval.files import write_text
 from rss_shield.eval.suite.judge.commonroad import read_commonroad
 from rss_shield.eval.suite.judge.judgement import judge_trace
 from rss_shield.eval.suite.judge.lanes import Table, see_all
-from rss_shield.eval.suite.judge.smoothing import filled_in
+from rss_shield.eval.suite.judge.smoothing import SURE, filled_in
 from rss_shield.shield import PRESETS, RSSParams, Rules, d_min_same_direction
 
 RECORDED = ("USA_US101-5_1_T-1", "USA_Lanker-1_3_T-1")  # NGSIM: a motorway in a jam, a city street with lights
@@ -52,7 +52,7 @@ def followers_of(traces: dict) -> Followers:
     parts, count = [], 0
     for trace in traces.values():
         params = PRESETS["slides"].other
-        for i, seen in see_all(trace, Table(params, params, PLAIN)).items():
+        for i, seen in see_all(trace, Table(params, params, PLAIN, trace.dt)).items():
             frames = seen.frames
             ahead = frames["present"] & frames["ego_is_rear"] & ~frames["opposite"] & (frames["gap_lat"] < 0.0)
             ahead &= frames["gap_lon"] > 0.0
@@ -104,7 +104,7 @@ def main() -> None:
     missing = [str(path) for path in paths.values() if not path.exists()]
     if missing:
         sys.exit(f"bench/human_traffic.py: no {', '.join(missing)}")
-    page = page_of({name: filled_in(read_commonroad(path))[0] for name, path in paths.items()}, options.seed)
+    page = page_of({name: read_commonroad(path) for name, path in paths.items()}, options.seed)
     print(page)
     if options.write:
         write_text(PAGE, page)
@@ -113,7 +113,8 @@ def main() -> None:
 def page_of(traces: dict, seed: int) -> str:
     """The page of results."""
     rng = np.random.default_rng(seed)
-    logs = {name: followers_of({name: trace}) for name, trace in traces.items()}
+    smooth = {name: filled_in(trace)[0] for name, trace in traces.items()}
+    logs = {name: followers_of({name: trace}) for name, trace in smooth.items()}
     sizes = [f"{name} {len(one.gap)} samples of {len(np.unique(one.who))} followers" for name, one in logs.items()]
     lines = [
         "# Human traffic",
@@ -145,7 +146,7 @@ def page_of(traces: dict, seed: int) -> str:
         median, low, high = quantile_with_interval(one.who, one.gap / one.v, 0.5, rng)
         cells.append(f"{median:.1f} s ({low:.1f} to {high:.1f})")
     lines += [f"| median time gap | | {' | '.join(cells)} |", "", "## Which response time fits", ""]
-    together = followers_of(traces)
+    together = followers_of(smooth)
     lines += _fitting(together, rng)
     lines += _duties(traces, rng)
     return "\n".join(lines) + "\n"
@@ -177,8 +178,8 @@ def _duties(traces: dict, rng: np.random.Generator) -> list[str]:
         "## Duties",
         "",
         "Stretches of danger of one user with another, from the view of who owes, with the parameters of the preset "
-        "for everybody. *Surely broken*: by more than two standard deviations of what positions and estimates are "
-        "worth. *Response given*: of the samples on which braking is owed, after the response time, those on which "
+        f"for everybody. *Surely broken*: by more than {SURE:g} standard deviations of what positions and estimates "
+        "are worth. *Response given*: of the samples on which braking is owed, after the response time, those on which "
         "the estimated command kept it, with an interval bootstrapped over stretches. *First braking*: median time "
         "from the threshold until who owes brakes with more than 0.5 m/s², of those that did.",
         "",
@@ -195,7 +196,7 @@ def _duties(traces: dict, rng: np.random.Generator) -> list[str]:
 
 
 def _unknown(trace):
-    """The trace without the accelerations that were filled in: so the judge knows that they are estimates."""
+    """The trace without accelerations, where it has any: so the judge estimates all of them in one way."""
     return trace.replaced(users=replace(trace.users, acceleration=np.full_like(trace.users.x, np.nan)))
 
 
