@@ -39,6 +39,13 @@ def seed_of(seed: Any) -> int | None:
     return None if seed is None else whole("seed", seed, 0)
 
 
+def reset_options(options: Any) -> dict[str, Any]:
+    """Options of a reset by name; which of them mean something is up to whoever reads them."""
+    if options is not None and not isinstance(options, Mapping):
+        raise ValueError(f"options = {options!r}: expected a dict such as {{'config': {{...}}}}, or None")
+    return dict(options or {})
+
+
 # ---------------------------------------------------------------- actions
 
 

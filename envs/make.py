@@ -7,6 +7,7 @@ import gymnasium as gym
 import rss_shield.envs.worlds.crosswalk
 import rss_shield.envs.worlds.occluded
 import rss_shield.envs.worlds.parking
+import rss_shield.envs.worlds.random_roads
 import rss_shield.envs.worlds.signalised  # noqa: F401  these register others
 from rss_shield.envs.highway.multi_agent import MultiAgentShield, has_agents
 from rss_shield.envs.highway.semantic import SemanticActions

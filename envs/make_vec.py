@@ -11,7 +11,7 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 from highway_env.envs.common.action import DiscreteMetaAction
 from highway_env.vehicle.kinematics import Vehicle
 
-from rss_shield.envs.arguments import rules_of, seed_of, whole
+from rss_shield.envs.arguments import reset_options, rules_of, seed_of, whole
 from rss_shield.envs.fast.config import Scenario, Unsupported, compile_scenario
 from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
 from rss_shield.envs.fast.semantic import SemanticVectorEnv
@@ -232,6 +232,7 @@ class _SideBySide(SyncVectorEnv):
     """gymnasium's, for seeds of numpy and several agents as well."""
 
     def reset(self, *, seed: Any = None, options: dict | None = None):
+        reset_options(options)
         several = seed is not None and np.ndim(seed) > 0
         return super().reset(seed=[seed_of(one) for one in seed] if several else seed_of(seed), options=options)
 

@@ -2,11 +2,13 @@
 
 import warnings
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
 import highway_env  # noqa: F401  registers the environments
 import numpy as np
+from gymnasium.envs.registration import load_env_creator
 from gymnasium.wrappers import TimeLimit
 from highway_env.envs.common.abstract import AbstractEnv, MultiAgentWrapper
 from highway_env.envs.common.action import MultiAgentAction
@@ -18,6 +20,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.arguments import whole
+from rss_shield.envs.known import check_known
 
 LONGEST_EPISODE = 100  # decisions, where highway-env sets no limit
 LOWEST_FREQUENCY = 5  # of simulation where roads cross [Hz]
@@ -33,14 +36,16 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
     That there is a later version of an environment asked for by its version is not said, once for each of a batch.
 
     Raises:
-      ValueError: an argument that the environment does not have, a bad `max_episode_steps`, or more decisions than
-        frames.
+      ValueError: an argument that the environment does not have, a bad `max_episode_steps`, a configuration that it
+        does not know or cannot run with, or more decisions than frames.
     """
     if kwargs.get("max_episode_steps") is not None:
         kwargs["max_episode_steps"] = whole("max_episode_steps", kwargs["max_episode_steps"], 1)
     with suppress(Exception):  # `gymnasium.make` complains; a class that exists before is left as it is
         class_from_path(kwargs["config"]["other_vehicles_type"])
     with drivers_unchanged(), _rewards_of_any_action():
+        if kwargs.get("config") is not None:
+            check_given(env_id, kwargs["config"])
         env = _made(env_id, kwargs)
         unwrapped: Any = env.unwrapped
         if not isinstance(unwrapped, AbstractEnv):
@@ -49,6 +54,42 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
         Upkeep(unwrapped)
     limited = env.spec is not None and env.spec.max_episode_steps is not None
     return env if limited or _has_duration(unwrapped) else TimeLimit(env, LONGEST_EPISODE)
+
+
+def check_given(env_id: str, config: Any) -> None:
+    """Refuse a configuration that an environment of highway-env's kind does not know or cannot run with.
+
+    Of others, and where only making it tells what it is, nothing is said.
+
+    Raises:
+      ValueError: see `envs.known.check_known`.
+    """
+    spec = gym.registry.get(env_id) if isinstance(env_id, str) else None
+    creator = spec.entry_point if spec is not None else None
+    kind = load_env_creator(creator) if isinstance(creator, str) else creator
+    if isinstance(kind, type) and issubclass(kind, AbstractEnv):
+        check_known(env_id, kind, config, partial(reward_names, env_id))
+
+
+def check_reset(env: Any, config: Any) -> None:
+    """Refuse what a reset cannot begin an episode with: what an environment has, but for what replaces it.
+
+    Raises:
+      ValueError: see `envs.known.check_known` and `check_frequencies`.
+    """
+    if config is not None:
+        name = env.spec.id if env.spec is not None else type(env).__name__
+        check_known(name, type(env), config, partial(reward_names, name))
+    check_frequencies(env.config | dict(config or {}))
+
+
+def reward_names(env_id: str) -> set[str]:
+    """Parts of the reward of an environment: their weights can be configured where the default is nothing."""
+    env = make_stock(env_id)
+    env.reset(seed=0)
+    info = env.step(env.action_space.sample())[4]
+    env.close()
+    return set(info.get("rewards", ()))
 
 
 def _made(env_id: str, arguments: dict[str, Any]) -> gym.Env:
@@ -168,7 +209,7 @@ class Upkeep:
     def __init__(self, env: Any) -> None:
         self.env = env
         self._settle()
-        env._reset, env.change_vehicles = self.reset, self.change_vehicles
+        env.configure, env._reset, env.change_vehicles = self.configure, self.reset, self.change_vehicles
         if isinstance(env, IntersectionEnv):
             env._spawn_vehicle = self.spawn_vehicle
         if not _has_duration(env):
@@ -179,6 +220,11 @@ class Upkeep:
             env.reset()
 
     # -- called by highway-env
+
+    def configure(self, config: Any) -> None:
+        """At a reset with a configuration: it is held to what holds for that of `make`."""
+        check_reset(self.env, config)
+        type(self.env).configure(self.env, config)
 
     def reset(self) -> None:
         check_frequencies(self.env.config)

@@ -130,6 +130,8 @@ def test_algorithms_that_share_a_policy_are_told_apart(tmp_path):
         ("my_driver:faster --preset best", "--preset best is out of range: expected one of auto, simulator"),
         ("my_driver:faster --env-id no-road", "no-road"),
         ("my_driver:faster --config.lane-count 3", "the nearest is config.lanes_count"),
+        ("my_driver:faster --config.initial-lane-id 7", "config.initial_lane_id = 7: expected None or a whole number"),
+        ("my_driver:faster --config.action.target-speeds [20]", "target_speeds = [20]: expected two speeds or more"),
         ("MODEL --env-id intersection-v0", "made for observations (5, 5), but intersection-v0 has (15, 7)"),
         ("MODEL --env-id merge-v0 --config.observation.vehicles-count 7", "but merge-v0 has (7, 5)"),
         (f"MODEL --out {__file__}", "expected a folder"),

@@ -36,7 +36,7 @@ from rss_shield.envs.fast.views.describe import Glance, views_of
 from rss_shield.envs.fast.views.record import View
 from rss_shield.envs.roads.hostile import NO_VICE, vice_of
 from rss_shield.envs.roads.network import CAR_LENGTH, CAR_WIDTH, Network, compile_network
-from rss_shield.envs.stock import drivers_unchanged, hands_out_rewards, make_stock
+from rss_shield.envs.stock import check_given, drivers_unchanged, hands_out_rewards, make_stock
 
 
 class Scenario(NamedTuple):
@@ -90,7 +90,8 @@ def compile_scenario(
     if env_id not in SCENARIOS:
         raise Unsupported(f"env_id = {env_id!r}", f"one of {', '.join(SCENARIOS)}")
     scenario = SCENARIOS[env_id]
-    asked = config or {}
+    asked = {} if config is None else config
+    check_given(env_id, asked)
     _check_action(scenario, env_id, asked)
     if "other_vehicles_type" in asked:  # with some highway-env itself fails
         _check_traffic(asked["other_vehicles_type"])

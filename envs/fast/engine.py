@@ -6,6 +6,7 @@ side by side. Environments do not see each other: results do not depend on who a
 
 import sys
 from collections.abc import Callable
+from copy import deepcopy
 from threading import Timer
 from typing import Any, NamedTuple
 
@@ -580,6 +581,19 @@ class Engine:
     def close(self) -> None:
         """Give the threads back."""
         self._crew.close()
+
+    def __deepcopy__(self, memo: dict) -> "Engine":
+        """All but what is compiled, which both share."""
+        twin = memo[id(self)] = object.__new__(type(self))
+        for name, value in vars(self).items():
+            setattr(twin, name, deepcopy(value, memo))
+        return twin
+
+    def __reduce__(self):
+        raise TypeError(
+            "an engine cannot be pickled, because it is bound to code that this process has compiled; expected "
+            "copy.deepcopy in the same process, or make_vec with the same arguments and seed in another"
+        )
 
 
 def _specialise(entry: Any, *arguments) -> Callable[..., None]:

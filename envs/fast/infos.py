@@ -5,7 +5,7 @@ nobody asks about.
 """
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from rss_shield.shield.risk import STATES
 from rss_shield.shield.tally import shield_infos
 
 _STATES = np.array(list(STATES), object)
+
+# what a decision has and the beginning of an episode has not
+OF_DECISIONS = ("raw_reward", "is_success", "proposed_action", "executed_action", "action_replaced")
 
 
 class Agents(NamedTuple):
@@ -106,3 +109,33 @@ def _risk_infos(risks: np.ndarray, dt: float) -> dict:
         "min_thw": risks["min_thw"],
         "max_drac": risks["max_drac"],
     }
+
+
+def where_decided(decided: np.ndarray, actions: Any) -> Any:
+    """Actions `[E, ...]` where one was decided upon, else 0; of several agents a tuple of them."""
+    if isinstance(actions, tuple):
+        return tuple(where_decided(decided, one) for one in actions)
+    return np.where(decided.reshape(-1, *[1] * (actions.ndim - 1)), actions, actions.dtype.type(0))
+
+
+def marked(infos: dict, where: np.ndarray, decided: np.ndarray) -> dict:
+    """Add the "_name" arrays that gymnasium expects; what only decisions have is left out where there was none."""
+    told = {}
+    for name, values in infos.items():
+        valid = decided if name in OF_DECISIONS else where
+        if valid is decided and not decided.any():
+            continue
+        if isinstance(values, tuple) and isinstance(values[0], dict):
+            values = tuple(marked(one, where, decided) for one in values)
+        told[name] = marked(values, where, decided) if isinstance(values, dict) else values
+        told["_" + name] = valid
+    return told
+
+
+def without(info: dict, names: tuple[str, ...]) -> dict:
+    def less(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(map(less, value))
+        return without(value, names) if isinstance(value, dict) else value
+
+    return {name: less(value) for name, value in info.items() if name not in names}

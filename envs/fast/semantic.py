@@ -56,6 +56,7 @@ class SemanticVectorEnv(VectorEnv):
         Args:
           actions: `[E]` integers.
         """
+        self.env.check_begun("step")
         chosen = self._chosen(np.asarray(actions))
         heads_for = self._of_egos("target_lane")
         labels = np.zeros(self.num_envs, np.int64)

@@ -40,6 +40,10 @@ class Crew:
         for helper in helpers:
             helper.result()
 
+    def __deepcopy__(self, memo: dict) -> "Crew":
+        """As many threads of its own."""
+        return Crew(self._threads)
+
     def close(self) -> None:
         """Give the threads back."""
         if self._pool is not None:

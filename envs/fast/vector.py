@@ -5,16 +5,17 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
 from highway_env.envs.common.action import DiscreteMetaAction
 
-from rss_shield.envs.arguments import seed_of, whole
+from rss_shield.envs.arguments import reset_options, seed_of, whole
 from rss_shield.envs.decisions.executed import executed_actions
 from rss_shield.envs.decisions.replacement import order_of, replace
-from rss_shield.envs.fast.config import Scenario
+from rss_shield.envs.fast.config import Scenario, Unsupported
 from rss_shield.envs.fast.engine import DISABLED, NEXT_STEP, SAME_STEP, Engine, Outputs
-from rss_shield.envs.fast.infos import Agents, step_infos
+from rss_shield.envs.fast.infos import OF_DECISIONS, Agents, marked, step_infos, where_decided, without
 from rss_shield.envs.fast.pictures import MODES as RENDER_MODES
 from rss_shield.envs.fast.pictures import Painter
 from rss_shield.envs.fast.recording import Recording
@@ -29,10 +30,6 @@ _MODES = {
     AutoresetMode.NEXT_STEP: NEXT_STEP,
     AutoresetMode.DISABLED: DISABLED,
 }
-
-
-# what a decision has and the beginning of an episode has not
-_OF_DECISIONS = ("raw_reward", "is_success", "proposed_action", "executed_action", "action_replaced")
 
 
 class FastVectorEnv(VectorEnv):
@@ -113,23 +110,32 @@ class FastVectorEnv(VectorEnv):
         self._everywhere = np.ones(num_envs, bool)
         self._decided = np.zeros(num_envs, bool)  # not where the last call began an episode
         self._seeded = False
+        self._begun = np.zeros(num_envs, bool)
+        self._all_begun = False
         self._infos: dict = {}
         self._began = np.full(num_envs, perf_counter())
 
     def reset(self, *, seed=None, options=None):
         """Begin episodes everywhere, or where `options["reset_mask"]` `[E]` says so."""
-        options = dict(options or {})
+        options = reset_options(options)
         mask = options.pop("reset_mask", None)
+        if "config" in options:
+            given = f"config = {options['config']!r} at a reset"
+            raise Unsupported(given, "it as an argument of make_vec, or backend = 'highway-env'")
         if options:
             raise ValueError(f"reset options {sorted(options)} are not supported; expected 'reset_mask'")
+        restarted = self._everywhere if mask is None else np.asarray(mask)
+        if restarted.shape != (self.num_envs,) or restarted.dtype != bool:
+            raise ValueError(f"reset option reset_mask = {mask!r}: expected {self.num_envs} truth values")
         self.engine.seed(self._seeds(seed))
-        outputs = self.engine.reset(mask)
-        restarted = self._everywhere if mask is None else np.asarray(mask, bool)
+        outputs = self.engine.reset(None if mask is None else restarted)
         self.recording.begin(restarted)
+        self._begun |= restarted
+        self._all_begun = bool(self._begun.all())
         self._began[restarted] = perf_counter()
         self._decided = np.zeros(self.num_envs, bool)
         self._infos = self._told(outputs, self._decided)
-        return self._shaped(outputs.observations), _marked(self._infos, restarted, self._decided)
+        return self._shaped(outputs.observations), marked(self._infos, restarted, self._decided)
 
     def step(self, actions):
         """One decision everywhere.
@@ -139,7 +145,11 @@ class FastVectorEnv(VectorEnv):
 
         Returns:
           Observations `[E, ...]`, rewards `[E]`, terminated `[E]`, truncated `[E]`, infos.
+
+        Raises:
+          ResetNeeded: somewhere no episode has been begun yet.
         """
+        self.check_begun("step")
         proposed = np.asarray(actions) if self.scenario.agents is None else self._of_each(actions)
         discrete, commands = self._commands(proposed)
         actions = proposed
@@ -153,13 +163,13 @@ class FastVectorEnv(VectorEnv):
 
         self._decided = ~ended if same_step else ~began if next_step else self._everywhere
         self._infos = self._told(outputs, self._decided, actions, proposed)
-        infos = _marked(self._infos, self._everywhere, self._decided)
+        infos = marked(self._infos, self._everywhere, self._decided)
         if ended.any():
             if same_step:
                 infos |= self._finals(outputs, ended, actions, proposed)
             else:
-                episode = {name: _where(ended, values) for name, values in self._episode(outputs).items()}
-                infos |= _marked({"episode": episode}, ended, ended)
+                episode = {name: where_decided(ended, values) for name, values in self._episode(outputs).items()}
+                infos |= marked({"episode": episode}, ended, ended)
         self._began[ended if same_step else began] = perf_counter()
         told = outputs.told
         rewards = told.rewards.T if told is not None and self.scenario.apart else outputs.rewards
@@ -173,18 +183,20 @@ class FastVectorEnv(VectorEnv):
 
         Raises:
           ValueError: there is no shield, or the actions are no meta-actions.
+          ResetNeeded: as `step`.
         """
         if self.settings is None:
             raise ValueError("action_masks with shield = None: expected shield = 'override' or 'monitor'")
         if not len(self.scenario.labels) or self.scenario.agents is not None:
             kind = type(self.scenario.stock.action_type).__name__
             raise ValueError(f"action_masks: expected DiscreteMetaAction, not {kind}")
+        self.check_begun("action_masks")
         return self.engine.action_masks()
 
     def info(self, e: int) -> dict:
         """The last infos of one environment as a plain dictionary."""
         info = info_at(self._infos, e)
-        return info if self._decided[e] else _without(info, _OF_DECISIONS)
+        return info if self._decided[e] else without(info, OF_DECISIONS)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Pictures of all environments, as `picture` makes them; None if `render_mode` is."""
@@ -209,13 +221,18 @@ class FastVectorEnv(VectorEnv):
         if self._painter is not None:
             self._painter.close()
 
+    def check_begun(self, what: str) -> None:
+        """Is there an episode everywhere?"""
+        if not self._all_begun:
+            raise ResetNeeded(f"{what} before reset(): expected reset() first, in every environment")
+
     def _finals(self, outputs: Outputs, ended, actions, proposed) -> dict:
         finals = self._told(outputs, ended, actions, proposed, final=True)
         finals["episode"] = self._episode(outputs, final=True)
         return {
             "final_obs": self._shaped(outputs.final_observations),
             "_final_obs": ended,
-            "final_info": _marked(finals, ended, ended),
+            "final_info": marked(finals, ended, ended),
             "_final_info": ended,
         }
 
@@ -226,7 +243,7 @@ class FastVectorEnv(VectorEnv):
         infos = step_infos(steps, self.scenario, self.settings, risks, agents)
         if actions is None:
             actions = proposed = create_empty_array(self.single_action_space, self.num_envs)
-        infos["action"] = _where(decided, actions)
+        infos["action"] = where_decided(decided, actions)
         if self.settings is not None and agents is None:
             infos["shield"] |= self._chosen(steps, decided, actions, proposed)
         elif self.settings is not None and agents is not None:
@@ -237,8 +254,8 @@ class FastVectorEnv(VectorEnv):
     def _chosen(self, steps, decided, actions, proposed) -> dict:
         """What one agent proposed, and what came of it."""
         return {
-            "proposed_action": _where(decided, proposed),
-            "executed_action": _where(decided, self._executed(steps, actions)),
+            "proposed_action": where_decided(decided, proposed),
+            "executed_action": where_decided(decided, self._executed(steps, actions)),
             "action_replaced": decided & (_rows(actions) != _rows(proposed)).any(axis=1),
         }
 
@@ -328,33 +345,3 @@ def _agents_of(outputs: Outputs, final: bool) -> Agents | None:
     if told is None:
         return None
     return Agents(told.final_steps, told.final_risks) if final else Agents(told.steps, told.risks)
-
-
-def _where(decided: np.ndarray, actions: Any) -> Any:
-    """Actions `[E, ...]` where one was decided upon, else 0; of several agents a tuple of them."""
-    if isinstance(actions, tuple):
-        return tuple(_where(decided, one) for one in actions)
-    return np.where(decided.reshape(-1, *[1] * (actions.ndim - 1)), actions, actions.dtype.type(0))
-
-
-def _marked(infos: dict, where: np.ndarray, decided: np.ndarray) -> dict:
-    """Add the "_name" arrays that gymnasium expects; what only decisions have is left out where there was none."""
-    marked = {}
-    for name, values in infos.items():
-        valid = decided if name in _OF_DECISIONS else where
-        if valid is decided and not decided.any():
-            continue
-        if isinstance(values, tuple) and isinstance(values[0], dict):
-            values = tuple(_marked(one, where, decided) for one in values)
-        marked[name] = _marked(values, where, decided) if isinstance(values, dict) else values
-        marked["_" + name] = valid
-    return marked
-
-
-def _without(info: dict, names: tuple[str, ...]) -> dict:
-    def less(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(map(less, value))
-        return _without(value, names) if isinstance(value, dict) else value
-
-    return {name: less(value) for name, value in info.items() if name not in names}

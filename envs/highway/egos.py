@@ -5,6 +5,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
 from highway_env.envs.lane_keeping_env import LaneKeepingEnv
 
 from rss_shield.envs.arguments import rules_of
@@ -110,6 +111,7 @@ class EgoShields(gym.Wrapper):
     def _begin(self) -> None:
         """Put new shields on for a new episode."""
         self._check()
+        _check_action_space(self.action_space, self.env.unwrapped)
         if self.sensing is not None:
             self._episode += 1
         self._settings, self._judge = self._current_settings(), self._judge_settings()
@@ -218,3 +220,17 @@ def egos_on(env: Any) -> Iterator[ShieldedEgo]:
 
 def _take_off(shield: ShieldedEgo) -> None:
     vars(shield.vehicle).pop("act", None)
+
+
+def _check_action_space(space: Any, env: Any) -> None:
+    """Do actions mean what they mean in the environment? Masks and replacements are lists of its own actions.
+
+    Numbers may be clipped or rescaled on their way: the shield sees what becomes of them.
+    """
+    own = env.action_space
+    same = space.shape == own.shape if isinstance(space, spaces.Box) and isinstance(own, spaces.Box) else space == own
+    if not same:
+        raise ValueError(
+            f"action_space = {space}: expected {own}, that of {type(env).__name__}; put a wrapper that changes it "
+            "around the shield"
+        )

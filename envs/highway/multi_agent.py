@@ -7,14 +7,14 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.common.action import MultiAgentAction
 
-from rss_shield.envs.arguments import actions_of, plain, seed_of
+from rss_shield.envs.arguments import actions_of, plain, reset_options, seed_of
 from rss_shield.envs.highway.egos import EgoShields
 from rss_shield.envs.highway.frames import Frame
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of
 from rss_shield.envs.highway.wrapper import traffic_info
 from rss_shield.envs.options import Given, Options, Params, check_action_type, check_kind
 from rss_shield.envs.sensing import Sensing
-from rss_shield.envs.stock import check_frequencies
+from rss_shield.envs.stock import check_frequencies, check_reset
 from rss_shield.shield.lanes.judge import Audit
 
 
@@ -62,8 +62,7 @@ class MultiAgentShield(EgoShields, RecordConstructorArgs):
         return tuple(audit_of(ego) for ego in self._egos)
 
     def reset(self, *, seed=None, options=None):
-        env: Any = self.env.unwrapped
-        check_frequencies(env.config | ((options or {}).get("config") or {}))
+        check_reset(self.env.unwrapped, reset_options(options).get("config"))
         observation, info = self.env.reset(seed=seed_of(seed), options=options)
         self._take_seed(seed_of(seed))
         self._begin()

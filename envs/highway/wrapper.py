@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from highway_env.envs.intersection_env import IntersectionEnv
 
-from rss_shield.envs.arguments import action_of, plain, seed_of
+from rss_shield.envs.arguments import action_of, plain, reset_options, seed_of
 from rss_shield.envs.decisions.replacement import order_of, replace
 from rss_shield.envs.highway.ego import ShieldedEgo
 from rss_shield.envs.highway.egos import EgoShields
@@ -16,7 +16,7 @@ from rss_shield.envs.highway.frames import Frame
 from rss_shield.envs.highway.risk import RiskFrame
 from rss_shield.envs.highway.step import audit_of, begin_step, charge, end_step, info_of, tell_inside
 from rss_shield.envs.options import Given, Params, check_environment, check_replace
-from rss_shield.envs.stock import check_frequencies
+from rss_shield.envs.stock import check_reset
 from rss_shield.shield.lanes.judge import Audit
 
 
@@ -161,12 +161,11 @@ class ShieldWrapper(EgoShields, RecordConstructorArgs):
         return audit_of(self._ego)
 
     def reset(self, *, seed=None, options=None):
-        env: Any = self.env.unwrapped
-        check_frequencies(env.config | ((options or {}).get("config") or {}))
+        check_reset(self.env.unwrapped, reset_options(options).get("config"))
         observation, info = self.env.reset(seed=seed_of(seed), options=options)
         self._take_seed(seed_of(seed))
         self._begin()
-        env = self.env.unwrapped
+        env: Any = self.env.unwrapped
         info.update(info_of(self._egos[0]), time=float(env.time), **traffic_info(self))
         return self._sensed(observation), info
 

@@ -220,7 +220,10 @@ class RandomRoads(HighwayEnv):
 
     def _create_road(self) -> None:
         rng = self.np_random
-        self.plan = draw_plan(rng, self.config["kind"] or str(rng.choice(KINDS)))
+        kind = self.config["kind"]
+        if kind is not None and kind not in KINDS:
+            raise ValueError(f"config.kind = {kind!r}: expected None or one of {', '.join(KINDS)}")
+        self.plan = draw_plan(rng, kind or str(rng.choice(KINDS)))
         self.road = Road(network=build(self.plan), np_random=rng, neighbour_vehicles_connected_lanes=True)
 
     def _create_vehicles(self) -> None:

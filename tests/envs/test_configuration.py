@@ -2,8 +2,10 @@
 
 import json
 
+import numpy as np
 import pytest
 
+from rss_shield import make, make_vec
 from rss_shield.envs.configuration import check_config, default_config
 from rss_shield.eval.config_option import read_config, split_arguments, with_values
 
@@ -182,3 +184,74 @@ def test_what_an_environment_would_ignore_or_not_understand_is_named(env_id, con
 )
 def test_what_it_knows_without_a_default_is_taken(env_id, config):
     check_config(env_id, config)
+
+
+SPEEDS = "expected two speeds or more \\[m/s\\], each greater than the one before"
+META, DISCRETE = {"type": "DiscreteMetaAction"}, {"type": "DiscreteAction"}
+WRONG = [
+    ("highway-fast-v0", {"initial_lane_id": 3}, "initial_lane_id = 3: expected None or a whole number from 0 to 2"),
+    ("highway-fast-v0", {"initial_lane_id": -1}, "initial_lane_id = -1: expected None or a whole number from 0 to 2"),
+    ("highway-fast-v0", {"lanes_count": 2, "initial_lane_id": 2}, "expected None or a whole number from 0 to 1"),
+    ("exit-v0", {"lanes_count": 1}, "config.lanes_count = 1: expected >= 2"),
+    ("exit-v0", {"lanes_count": 4.0}, "config.lanes_count = 4.0: expected a whole number >= 1"),
+    ("highway-fast-v0", {"action": META | {"target_speeds": [20]}}, "config.action.target_speeds = .*: " + SPEEDS),
+    ("highway-fast-v0", {"action": META | {"target_speeds": [20, float("nan")]}}, SPEEDS),
+    ("highway-fast-v0", {"action": META | {"target_speeds": [30, 20]}}, SPEEDS),
+    ("highway-fast-v0", {"action": META | {"target_speeds": 20}}, SPEEDS),
+    (
+        "intersection-multi-agent-v0",
+        {"action": {"type": "MultiAgentAction", "action_config": META | {"target_speeds": [9]}}},
+        "config.action.action_config.target_speeds = .*: " + SPEEDS,
+    ),
+    (
+        "highway-fast-v0",
+        {"action": DISCRETE | {"actions_per_axis": 2.5}},
+        "config.action.actions_per_axis = 2.5: expected a whole number >= 1",
+    ),
+    ("highway-fast-v0", {"action": "DiscreteAction"}, "config.action = 'DiscreteAction': expected keys with values"),
+    ("highway-fast-v0", {"action": {"type": []}}, r"config.action.type = \[\]: expected one of ContinuousAction"),
+    ("roundabout-v0", {"incoming_vehicle_destination": 3}, "destination = 3: expected None or a whole number from 0"),
+    ("roundabout-v1", {"incoming_vehicle_destination": "exr"}, "destination = 'exr': expected None or a whole number"),
+    ("highway-fast-v0", {"controlled_vehicles": 0}, "config.controlled_vehicles = 0: expected a whole number >= 1"),
+    ("merge-v0", {"controlled_vehicles": 0}, "config.controlled_vehicles = 0: expected a whole number >= 1"),
+    ("intersection-v0", {"spawn_probability": 2}, "config.spawn_probability = 2: expected a number from 0 to 1"),
+    ("intersection-v0", {"simulation_frequency": 0}, "config.simulation_frequency = 0: expected a number > 0"),
+    ("highway-fast-v0", {"lane_count": 4}, "lane_count is not known to .*; the nearest is config.lanes_count"),
+    ("merge-v0", {"other_vehicles_type": None}, "config.other_vehicles_type = None: expected a text"),
+    ("highway-fast-v0", {"duration": None}, "config.duration = None: expected a finite number"),
+    ("highway-fast-v0", [1], r"config = \[1\]: expected keys with values"),
+    *(
+        (env_id, {"other_vehicles_type": kind}, f"other_vehicles_type = {kind!r}: expected the path of a class")
+        for env_id, kind in (
+            ("highway-fast-v0", "highway_env.vehicle.controller.ControlledVehicle"),
+            ("intersection-v0", "highway_env.vehicle.kinematics.Vehicle"),
+            ("highway-fast-v0", "highway_env.vehicle.behavior.NoSuchVehicle"),
+            ("merge-v0", "IDMVehicle"),
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize(("env_id", "config", "message"), WRONG)
+def test_what_an_environment_cannot_run_with_is_named_on_either_backend(env_id, config, message):
+    with pytest.raises(ValueError, match=message):
+        make(env_id, config=config)
+    for backend in ("fast", "highway-env"):
+        with pytest.raises(ValueError, match=message):
+            make_vec(env_id, 1, backend=backend, config=config)
+
+
+@pytest.mark.parametrize(
+    ("env_id", "config"),
+    [
+        ("highway-fast-v0", {"lanes_count": np.int64(2), "initial_lane_id": 1, "duration": np.float32(9)}),
+        ("highway-fast-v0", {"action": META | {"target_speeds": np.array([10, 20, 30])}}),
+        ("exit-v0", {"lanes_count": 2}),
+        ("merge-v0", {"controlled_vehicles": 1, "duration": 9}),
+        ("roundabout-v0", {"destination": "exr", "incoming_vehicle_destination": 2}),
+    ],
+)
+def test_what_an_environment_can_run_with_is_taken_on_either_backend(env_id, config):
+    make(env_id, config=config).reset(seed=0)
+    make_vec(env_id, 1, config=config)
+    make_vec(env_id, 1, backend="highway-env", config=config).reset(seed=0)
