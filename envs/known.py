@@ -151,7 +151,7 @@ def _check_value(name: str, value: Any, default: Any) -> None:
         raise ValueError(f"{name} = {value!r}: expected a whole number >= {least}")
     if value is None and default is None:
         return
-    if key.endswith("_range") and not (_is_range(value) or isinstance(value, Mapping)):
+    if key.endswith("_range") and not _is_number(default) and not (_is_range(value) or isinstance(value, Mapping)):
         raise ValueError(f"{name} = {value!r}: expected two numbers, the smaller first")
     if key == "target_speeds" and not _is_ladder(value):
         raise ValueError(f"{name} = {value!r}: expected two speeds or more [m/s], each greater than the one before")

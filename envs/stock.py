@@ -77,10 +77,14 @@ def check_reset(env: Any, config: Any) -> None:
     Raises:
       ValueError: see `envs.known.check_known` and `check_frequencies`.
     """
+    _check_known_to(env, config)
+    check_frequencies(env.config | dict(config or {}))
+
+
+def _check_known_to(env: Any, config: Any) -> None:
     if config is not None:
         name = env.spec.id if env.spec is not None else type(env).__name__
         check_known(name, type(env), config, partial(reward_names, name))
-    check_frequencies(env.config | dict(config or {}))
 
 
 def reward_names(env_id: str) -> set[str]:
@@ -222,8 +226,8 @@ class Upkeep:
     # -- called by highway-env
 
     def configure(self, config: Any) -> None:
-        """At a reset with a configuration: it is held to what holds for that of `make`."""
-        check_reset(self.env, config)
+        """By hand, or at a reset: what holds for the configuration of `make` holds for this one."""
+        _check_known_to(self.env, config)
         type(self.env).configure(self.env, config)
 
     def reset(self) -> None:

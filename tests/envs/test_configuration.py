@@ -180,6 +180,7 @@ def test_what_an_environment_would_ignore_or_not_understand_is_named(env_id, con
         ("highway-v0", {"on_road_reward": 0.1}),
         ("exit-v0", {"initial_lane_id": 2, "other_vehicles_type": "highway_env.vehicle.behavior.DefensiveVehicle"}),
         ("highway-v0", {"observation": {"type": "TimeToCollision", "horizon": 5}}),
+        ("highway-v0", {"observation": {"type": "LidarObservation", "maximum_range": 45}}),
     ],
 )
 def test_what_it_knows_without_a_default_is_taken(env_id, config):
