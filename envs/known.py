@@ -6,6 +6,7 @@ highway-env ignores what it does not know, and fails somewhere else on what it c
 import difflib
 import inspect
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from itertools import pairwise
 from numbers import Integral, Real
@@ -54,7 +55,19 @@ POSITIVE_ENDINGS = ("_frequency", "_merge_length")
 SHARES = ("spawn_probability", "unreasonable")
 
 
-def check_known(env_id: str, kind: type, config: Any, reward_names: Callable[[], set[str]]) -> None:
+def refuse(message: str) -> None:
+    """What an experiment would ignore must not be in it."""
+    raise ValueError(message)
+
+
+def warn(message: str) -> None:
+    """Somebody's own code may read it."""
+    warnings.warn(f"{message}, and it is ignored here", UserWarning, stacklevel=2)
+
+
+def check_known(
+    env_id: str, kind: type, config: Any, reward_names: Callable[[], set[str]], unknown: Callable[[str], None] = refuse
+) -> None:
     """Refuse what an environment would ignore, and values that it cannot run with.
 
     Args:
@@ -62,6 +75,7 @@ def check_known(env_id: str, kind: type, config: Any, reward_names: Callable[[],
       kind: class of the environment.
       config: what replaces its defaults, as for `gymnasium.make`.
       reward_names: tells the parts of its reward. Asked only if there is a key without a default.
+      unknown: what becomes of a key that highway-env would ignore.
 
     Raises:
       ValueError: names the key and the nearest known one, or key, value and what is expected.
@@ -76,14 +90,15 @@ def check_known(env_id: str, kind: type, config: Any, reward_names: Callable[[],
         if key not in defaults:
             known = {*defaults, *reward_names()}
             if key not in known:
-                raise ValueError(f"{name} is not known to {env_id}; the nearest is config.{_nearest(key, known)}")
-            _check_value(name, value, 0.0)
+                unknown(f"{name} is not known to {env_id}; the nearest is config.{_nearest(key, known)}")
+            else:
+                _check_value(name, value, 0.0)
         elif key in TYPES:
-            _check_typed(name, value, defaults[key], key)
+            _check_typed(name, value, defaults[key], key, unknown)
         else:
             _check_value(name, value, defaults[key])
             if isinstance(value, Mapping):
-                _check_names(name, value, defaults[key])
+                _check_names(name, value, defaults[key], unknown)
     _check_scene(kind, {**defaults, **config})
 
 
@@ -98,7 +113,8 @@ def _check_scene(kind: type, config: Mapping[str, Any]) -> None:
     if goal is not None and not (_is_whole(goal) and 0 <= goal <= 2):
         expected = "None or a whole number from 0 to 2, the exit"
         raise ValueError(f"config.incoming_vehicle_destination = {goal!r}: expected {expected}")
-    _check_traffic(config["other_vehicles_type"])
+    if "other_vehicles_type" in config:
+        _check_traffic(config["other_vehicles_type"])
 
 
 def _check_traffic(path: Any) -> None:
@@ -114,7 +130,7 @@ def _check_traffic(path: Any) -> None:
         )
 
 
-def _check_typed(name: str, config: Any, default: Any, what: str) -> None:
+def _check_typed(name: str, config: Any, default: Any, what: str, unknown: Callable[[str], None]) -> None:
     """An observation or an action: "type" says which, the rest are its parameters."""
     if not isinstance(config, Mapping):
         raise ValueError(f"{name} = {config!r}: expected keys with values, such as {default!r}")
@@ -125,22 +141,22 @@ def _check_typed(name: str, config: Any, default: Any, what: str) -> None:
         raise ValueError(f"{name}.type = {kind!r}: expected one of {', '.join(types)}{near}")
     # a default may hold keys that its own type ignores
     known = {**(default if own else {"type": kind}), **(_parameters(types[kind]) if kind in types else {})}
-    _check_names(name, config, known)
+    _check_names(name, config, known, unknown)
     for key, value in config.items():
         if key == f"{what}_config":  # of each agent: where there is one by default, as for that one
-            _check_typed(f"{name}.{key}", value, default.get(key, default), what)
+            _check_typed(f"{name}.{key}", value, default.get(key, default), what, unknown)
         elif key == f"{what}_configs":
             _check_value(f"{name}.{key}", value, [])
             for i, one in enumerate(value):
-                _check_typed(f"{name}.{key}[{i}]", one, default, what)
-        else:
+                _check_typed(f"{name}.{key}[{i}]", one, default, what, unknown)
+        elif key in known:
             _check_value(f"{name}.{key}", value, known[key])
 
 
-def _check_names(name: str, config: Mapping[str, Any], known: Iterable[str]) -> None:
+def _check_names(name: str, config: Mapping[str, Any], known: Iterable[str], unknown: Callable[[str], None]) -> None:
     for key in config:
         if key not in known:
-            raise ValueError(f"{name}.{key} is not known; the nearest is {name}.{_nearest(key, known)}")
+            unknown(f"{name}.{key} is not known; the nearest is {name}.{_nearest(key, known)}")
 
 
 def _check_value(name: str, value: Any, default: Any) -> None:

@@ -20,7 +20,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from rss_shield.envs.arguments import whole
-from rss_shield.envs.known import check_known
+from rss_shield.envs.known import check_known, warn
 
 LONGEST_EPISODE = 100  # decisions, where highway-env sets no limit
 LOWEST_FREQUENCY = 5  # of simulation where roads cross [Hz]
@@ -37,7 +37,7 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
 
     Raises:
       ValueError: an argument that the environment does not have, a bad `max_episode_steps`, a configuration that it
-        does not know or cannot run with, or more decisions than frames.
+        cannot run with, or more decisions than frames. Of a key that it does not know there is a warning.
     """
     if kwargs.get("max_episode_steps") is not None:
         kwargs["max_episode_steps"] = whole("max_episode_steps", kwargs["max_episode_steps"], 1)
@@ -57,7 +57,7 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
 
 
 def check_given(env_id: str, config: Any) -> None:
-    """Refuse a configuration that an environment of highway-env's kind does not know or cannot run with.
+    """Refuse a configuration that an environment of highway-env's kind cannot run with, and warn of unknown keys.
 
     Of others, and where only making it tells what it is, nothing is said.
 
@@ -68,7 +68,7 @@ def check_given(env_id: str, config: Any) -> None:
     creator = spec.entry_point if spec is not None else None
     kind = load_env_creator(creator) if isinstance(creator, str) else creator
     if isinstance(kind, type) and issubclass(kind, AbstractEnv):
-        check_known(env_id, kind, config, partial(reward_names, env_id))
+        check_known(env_id, kind, config, partial(reward_names, env_id), warn)
 
 
 def check_reset(env: Any, config: Any) -> None:
@@ -84,7 +84,7 @@ def check_reset(env: Any, config: Any) -> None:
 def _check_known_to(env: Any, config: Any) -> None:
     if config is not None:
         name = env.spec.id if env.spec is not None else type(env).__name__
-        check_known(name, type(env), config, partial(reward_names, name))
+        check_known(name, type(env), config, partial(reward_names, name), warn)
 
 
 def reward_names(env_id: str) -> set[str]:

@@ -1,6 +1,7 @@
 """The environment's configuration from files and command lines, checked against what the environment knows."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -217,7 +218,6 @@ WRONG = [
     ("merge-v0", {"controlled_vehicles": 0}, "config.controlled_vehicles = 0: expected a whole number >= 1"),
     ("intersection-v0", {"spawn_probability": 2}, "config.spawn_probability = 2: expected a number from 0 to 1"),
     ("intersection-v0", {"simulation_frequency": 0}, "config.simulation_frequency = 0: expected a number > 0"),
-    ("highway-fast-v0", {"lane_count": 4}, "lane_count is not known to .*; the nearest is config.lanes_count"),
     ("merge-v0", {"other_vehicles_type": None}, "config.other_vehicles_type = None: expected a text"),
     ("highway-fast-v0", {"duration": None}, "config.duration = None: expected a finite number"),
     ("highway-fast-v0", [1], r"config = \[1\]: expected keys with values"),
@@ -231,6 +231,25 @@ WRONG = [
         )
     ),
 ]
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        (
+            {"lane_count": 4},
+            r"config\.lane_count is not known to .*; the nearest is config\.lanes_count, and it is ign",
+        ),
+        (
+            {"observation": {"type": "Kinematics", "vehicle_count": 4}},
+            r"the nearest is config\.observation\.vehicles_co",
+        ),
+    ],
+)
+def test_of_a_key_that_only_somebodys_own_code_could_read_there_is_a_warning(config, message):
+    for maker in (make, partial(make_vec, num_envs=1), partial(make_vec, num_envs=1, backend="highway-env")):
+        with pytest.warns(UserWarning, match=message):
+            maker("highway-fast-v0", config=config)
 
 
 @pytest.mark.parametrize(("env_id", "config", "message"), WRONG)
