@@ -52,6 +52,7 @@ LEAST = {
 # roads are built by these, and episodes end by the first
 POSITIVE = ("duration", "vehicles_density", "roundabout_radius")
 POSITIVE_ENDINGS = ("_frequency", "_merge_length")
+DRAWN = ("destination",)  # at random where it is None
 SHARES = ("spawn_probability", "unreasonable")
 
 
@@ -107,8 +108,9 @@ def _check_scene(kind: type, config: Mapping[str, Any]) -> None:
     lanes, lane = config.get("lanes_count", 1), config.get("initial_lane_id")
     if issubclass(kind, ExitEnv) and lanes < 2:
         raise ValueError(f"config.lanes_count = {lanes!r}: expected >= 2, because traffic leaves the last lane free")
-    if lane is not None and not (_is_whole(lane) and 0 <= lane < lanes):
-        raise ValueError(f"config.initial_lane_id = {lane!r}: expected None or a whole number from 0 to {lanes - 1}")
+    if lane is not None and not (_is_whole(lane) and -lanes <= lane < lanes):
+        expected = f"None or a whole number from {-lanes} to {lanes - 1}, below 0 from the last lane on"
+        raise ValueError(f"config.initial_lane_id = {lane!r}: expected {expected}")
     goal = config.get("incoming_vehicle_destination")
     if goal is not None and not (_is_whole(goal) and 0 <= goal <= 2):
         expected = "None or a whole number from 0 to 2, the exit"
@@ -165,7 +167,7 @@ def _check_value(name: str, value: Any, default: Any) -> None:
     least = LEAST.get(key, 0 if key.endswith("_count") else None)
     if least is not None and not (_is_whole(value) and value >= least):
         raise ValueError(f"{name} = {value!r}: expected a whole number >= {least}")
-    if value is None and default is None:
+    if value is None and (default is None or key in DRAWN):
         return
     if key.endswith("_range") and not _is_number(default) and not (_is_range(value) or isinstance(value, Mapping)):
         raise ValueError(f"{name} = {value!r}: expected two numbers, the smaller first")

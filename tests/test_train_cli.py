@@ -106,7 +106,7 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--config.lanes-count 0", "config.lanes_count = 0: expected a whole number >= 1"),
         ("--config.vehicles-density 0", "config.vehicles_density = 0: expected a number > 0"),
         ("--config.duration -5", "config.duration = -5: expected a number > 0"),
-        ("--config.initial-lane-id 9", "config.initial_lane_id = 9: not possible in highway-fast-v0: IndexError"),
+        ("--config.initial-lane-id 9", "config.initial_lane_id = 9: expected None or a whole number from -3 to 2"),
         (
             "--config.observation.vehicle-count 8",
             "config.observation.vehicle_count is not known; the nearest is config.observation.vehicles_count",

@@ -191,9 +191,9 @@ def test_what_it_knows_without_a_default_is_taken(env_id, config):
 SPEEDS = "expected two speeds or more \\[m/s\\], each greater than the one before"
 META, DISCRETE = {"type": "DiscreteMetaAction"}, {"type": "DiscreteAction"}
 WRONG = [
-    ("highway-fast-v0", {"initial_lane_id": 3}, "initial_lane_id = 3: expected None or a whole number from 0 to 2"),
-    ("highway-fast-v0", {"initial_lane_id": -1}, "initial_lane_id = -1: expected None or a whole number from 0 to 2"),
-    ("highway-fast-v0", {"lanes_count": 2, "initial_lane_id": 2}, "expected None or a whole number from 0 to 1"),
+    ("highway-fast-v0", {"initial_lane_id": 3}, "initial_lane_id = 3: expected None or a whole number from -3 to 2"),
+    ("highway-fast-v0", {"initial_lane_id": -4}, "initial_lane_id = -4: expected None or a whole number from -3 to 2"),
+    ("highway-fast-v0", {"lanes_count": 2, "initial_lane_id": 2}, "expected None or a whole number from -2 to 1"),
     ("exit-v0", {"lanes_count": 1}, "config.lanes_count = 1: expected >= 2"),
     ("exit-v0", {"lanes_count": 4.0}, "config.lanes_count = 4.0: expected a whole number >= 1"),
     ("highway-fast-v0", {"action": META | {"target_speeds": [20]}}, "config.action.target_speeds = .*: " + SPEEDS),

@@ -214,9 +214,9 @@ def test_streets_are_drawn():
 @pytest.mark.parametrize(
     ("config", "message"),
     [
-        ({"occluders": 1}, "config occluders = 1: expected True or False"),
-        ({"pedestrians": -1}, "config pedestrians = -1: expected a whole number >= 0"),
-        ({"unreasonable": 2.0}, "config unreasonable = 2.0: expected a probability, 0 to 1"),
+        ({"occluders": 1}, "config.occluders = 1: expected true or false"),
+        ({"pedestrians": -1}, "config.pedestrians = -1: expected a whole number >= 0"),
+        ({"unreasonable": 2.0}, "config.unreasonable = 2.0: expected a number from 0 to 1"),
     ],
 )
 def test_bad_configurations_are_refused(config, message):

@@ -58,7 +58,11 @@ def written(folder, pattern):
 
 
 def count(folder, pattern):
-    return len(written(folder, pattern))
+    while True:
+        try:
+            return len(written(folder, pattern))
+        except FileNotFoundError:  # a hidden folder that was there when it was listed
+            continue
 
 
 def contents(folder, pattern):

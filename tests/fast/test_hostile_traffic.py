@@ -68,7 +68,7 @@ def test_names_say_which_vice_and_whether_it_is_bounded():
     assert vice_of(HOSTILE["bounded-mixed"]) == (MIXED, True)
     assert vice_of("highway_env.vehicle.behavior.IDMVehicle") is None
     with pytest.raises(Unsupported, match="one of HOSTILE"):
-        compile_scenario("highway-fast-v0", {"other_vehicles_type": "highway_env.vehicle.kinematics.Vehicle"})
+        compile_scenario("highway-fast-v0", {"other_vehicles_type": "rss_shield.envs.worlds.random_roads.Tailgater"})
 
 
 def test_a_brake_checker_brakes_when_it_is_in_the_way():

@@ -103,7 +103,7 @@ def test_drivers_elsewhere_keep_their_parameters():
         ("intersection-v1", None, "intersection-v1"),
         (ENV, {"controlled_vehicles": 2}, "controlled_vehicles"),
         (ENV, {"destination": "il2"}, "il2"),
-        (ENV, {"other_vehicles_type": "highway_env.vehicle.kinematics.Vehicle"}, "kinematics.Vehicle"),
+        (ENV, {"other_vehicles_type": "rss_shield.envs.worlds.random_roads.Tailgater"}, "Tailgater"),
     ],
 )
 def test_an_unsupported_feature_is_named(env_id, config, named):

@@ -52,8 +52,8 @@ def test_the_sum_of_three_products_is_asked_of_numpy():
 
 
 def test_other_traffic_is_refused_by_name(monkeypatch):
-    with pytest.raises(Unsupported, match=r"ControlledVehicle.*LinearVehicle"):
-        compile_scenario(ENV, {"other_vehicles_type": "highway_env.vehicle.controller.ControlledVehicle"})
+    with pytest.raises(Unsupported, match=r"Tailgater.*LinearVehicle"):
+        compile_scenario(ENV, {"other_vehicles_type": "rss_shield.envs.worlds.random_roads.Tailgater"})
     monkeypatch.setattr(linear_drivers, "THREE_ARE_KNOWN", False)
     with pytest.raises(Unsupported, match="AggressiveVehicle with the way in which numpy"):
         compile_scenario(ENV, {"other_vehicles_type": KINDS[1]})
