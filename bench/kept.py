@@ -24,15 +24,8 @@ from rss_shield.eval.files import atomic, folder_for, refuse
 
 SUFFIXES = (".csv", ".json", ".jsonl")
 DATA = Path(__file__).resolve().parents[1] / "docs" / "results" / "data"
-NAMES = {  # of an archive: files and folders in runs/
-    "environments": ("environments",),
-    "people": ("people.jsonl",),
-    "parking": ("parking",),
-    "stress": ("stress",),
-    "evidence": ("evidence",),
-    "semantic": ("semantic",),
-    "evasion": ("evasion",),
-}
+ENTRIES = ("environments", "people.jsonl", "parking", "stress", "evidence", "semantic", "evasion")  # in runs/
+NAMES = {Path(entry).stem: entry for entry in ENTRIES}  # of an archive: the file or folder that is in it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,11 +40,10 @@ class Config:
 
 def files_of(name: str, runs: Path) -> Iterator[Path]:
     """Tables and numbers of an archive, relative to `runs`, in order; what was half written is none."""
-    for entry in NAMES[name]:
-        path = runs / entry
-        for file in [path] if path.is_file() else sorted(path.rglob("*")):
-            if file.is_file() and file.suffix in SUFFIXES and not file.name.startswith("."):
-                yield file.relative_to(runs)
+    path = runs / NAMES[name]
+    for file in [path] if path.is_file() else sorted(path.rglob("*")):
+        if file.is_file() and file.suffix in SUFFIXES and not file.name.startswith("."):
+            yield file.relative_to(runs)
 
 
 def archive(name: str, data: Path) -> Path:
