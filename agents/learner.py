@@ -13,6 +13,7 @@ from gymnasium.vector import VectorEnv
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
+from rss_shield.agents.networks import policy_arguments
 from rss_shield.agents.vec_env import VectorEnvAdapter
 
 # name -> where it is
@@ -90,6 +91,18 @@ class Learner(NamedTuple):
             check_hyperparameter(name, value)
         return self._replace(options=lambda n_envs, total: {**self.options(n_envs, total), **changes})
 
+    def with_network(self, name: str) -> "Learner":
+        """This learner with a network of `agents.networks` in front of its own layers."""
+        more = policy_arguments(name)
+        if not more:
+            return self
+
+        def options(n_envs: int, total: int) -> dict[str, Any]:
+            given = self.options(n_envs, total)
+            return {**given, "policy_kwargs": {**given.get("policy_kwargs", {}), **more}}
+
+        return self._replace(options=options)
+
     def defaults(self) -> dict[str, Any]:
         """The arguments of the algorithm that have a value of their own."""
         for kind in self.algorithm.__mro__:
@@ -107,11 +120,19 @@ class Learner(NamedTuple):
             "algorithm": f"{self.algorithm.__module__.split('.')[0]}.{self.algorithm.__name__}",
             "policy": "MlpPolicy",
             **{name: value for name, value in self.defaults().items() if name not in _NO_HYPERPARAMETERS},
-            **self.options(n_envs, total_timesteps),
+            **_as_words(self.options(n_envs, total_timesteps)),
             **self.notes,
             "rollouts_per_block": self.rollouts_per_block(n_envs),
             "timesteps": self.rounded(n_envs, total_timesteps),
         }
+
+
+def _as_words(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options as a file can say them: classes by their names."""
+    return {
+        name: _as_words(value) if isinstance(value, Mapping) else value.__name__ if isinstance(value, type) else value
+        for name, value in options.items()
+    }
 
 
 def check_hyperparameter(name: str, value: Any) -> None:

@@ -18,6 +18,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import FlattenExtractor
 
+from rss_shield.agents.networks import Rows
+
 Policy = Callable[..., np.ndarray]
 ALGORITHM = "algorithm_path"  # attribute of our models: where their class is
 # module of the policy's class, an entry that tells apart who shares it (None: any) -> the class of the algorithm
@@ -70,14 +72,14 @@ def algorithm_in(path: Path) -> type[BaseAlgorithm]:
 def policy_of(model: BaseAlgorithm) -> Policy:
     """The greedy policy of a model as it is now.
 
-    Runs on the CPU, one thread. Where the policy is a plain network for discrete actions, in double precision: rounding
-    depends on B, and so must be far too small to turn one action into another.
+    Runs on the CPU, one thread. Where the policy is a network of ours or a plain one for discrete actions, in double
+    precision: rounding depends on B, and so must be far too small to turn one action into another.
     """
     torch.set_num_threads(1)
     policy: Any = model.policy
     masked = type(policy).__module__.startswith("sb3_contrib.common.maskable")
     plain = isinstance(policy, ActorCriticPolicy) or masked
-    if plain and hasattr(model.action_space, "n") and isinstance(policy.features_extractor, FlattenExtractor):
+    if plain and hasattr(model.action_space, "n") and isinstance(policy.features_extractor, FlattenExtractor | Rows):
         return _Logits(policy, masked)
     return _Predicting(model)
 
@@ -87,12 +89,12 @@ class _Logits:
 
     def __init__(self, policy: Any, masked: bool) -> None:
         # a copy: the model may go on learning
-        actor = torch.nn.Sequential(policy.mlp_extractor.policy_net, policy.action_net)
+        actor = torch.nn.Sequential(policy.features_extractor, policy.mlp_extractor.policy_net, policy.action_net)
         self.logits, self.masked = copy.deepcopy(actor).double().cpu(), masked
 
     def __call__(self, observations: np.ndarray, masks: np.ndarray | None = None) -> np.ndarray:
         with torch.no_grad():
-            logits = self.logits(torch.as_tensor(observations, dtype=torch.float64).flatten(1)).numpy()
+            logits = self.logits(torch.as_tensor(observations, dtype=torch.float64)).numpy()
         if masks is not None:
             logits = np.where(masks | ~masks.any(axis=1, keepdims=True), logits, -np.inf)
         return logits.argmax(axis=1)

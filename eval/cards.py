@@ -46,6 +46,7 @@ def card_of(arm: str, seed: int, run: dict[str, Any], episodes: pd.DataFrame) ->
         "what": row.label,
         "train_seed": seed,
         **{name: config[name] for name in SETTING},
+        "history": config.get("history", 1),
         "config": {**config["config"], **row.config},
         "training": {
             **{name: config[name] for name in TRAINING},
@@ -94,7 +95,8 @@ def as_text(card: dict[str, Any]) -> str:
             f"{training['n_envs']} environments side by side; shield in training: {training['shield']}; "
             f"{_paid(training)}"
             f"RSS preset {card['preset']}; entry {card['entry']}, intent {card['intent']}, waiting {card['waiting']}.",
-            f"Configuration that differs from the environment's: {card['config'] or 'none'}.",
+            f"Configuration that differs from the environment's: {card['config'] or 'none'}."
+            + (f" It sees the last {card['history']} observations, `[H, ...]`." if card["history"] > 1 else ""),
             "",
             f"{n} test episodes a column, seeds {seeds['first']} to {seeds['last']}, greedy; [95 % interval]: Wilson's "
             "for rates, Student's for means.",

@@ -21,6 +21,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from rich.console import Console
 
 import rss_shield
+from rss_shield.agents.history import LONGEST, with_history
 from rss_shield.agents.load import algorithm_in, policy_of
 from rss_shield.command_line import NO_OVERRIDES, ConfigFile, Overrides, fail, parsed, shown
 from rss_shield.envs.configuration import check_config, default_config
@@ -98,6 +99,8 @@ class Config:
     """Which routes it expects of others there: known, straight or any."""
     waiting: str = ""
     """Where it may wait there: line or anywhere."""
+    history: int = 0
+    """How many of the last observations it sees, side by side; by default as many as the card says, else one."""
     one_by_one: bool = False
     """The function maps one observation to one action."""
     out: Path = Path()
@@ -153,7 +156,8 @@ def completed(config: Config, values: dict[tuple[str, ...], Any], card: Mapping[
         name: getattr(config, name) or card.get(name, default)
         for name, default in (("entry", "cautious"), ("intent", "any"), ("waiting", "line"))
     }
-    config = replace(config, env_id=env_id, config=given, **conduct)
+    history = config.history or card.get("history", 1)
+    config = replace(config, env_id=env_id, config=given, history=history, **conduct)
     if config.out == Path():
         name = Path(config.policy).stem if ":" not in config.policy else config.policy.replace(":", "-")
         parent = Path(config.policy).parent.name if config.policy.endswith(".zip") else ""
@@ -161,6 +165,7 @@ def completed(config: Config, values: dict[tuple[str, ...], Any], card: Mapping[
     for option, good, expected in (
         ("episodes", config.episodes >= 1, "at least 1"),
         ("first_seed", 0 <= config.first_seed < 2**31, "0 to 2**31 - 1"),
+        ("history", 1 <= config.history <= LONGEST, f"1 to {LONGEST}"),
         ("backend", config.backend in BACKENDS, f"one of {', '.join(BACKENDS)}"),
         ("preset", is_file(config.preset) or config.preset in ("auto", *PRESETS), f"one of auto, {KNOWN_PRESETS}"),
         ("entry", config.entry in ENTRIES, f"one of {', '.join(ENTRIES)}"),
@@ -245,7 +250,7 @@ def policy_for(config: Config, card: Mapping[str, Any]) -> tuple[Tested, Config]
 
 def environments(config: Config, params: Any, shield: Mapping[str, Any], n_envs: int) -> VectorEnv:
     conduct: dict[str, Any] = {"entry": config.entry, "intent": config.intent, "waiting": config.waiting}
-    return rss_shield.make_vec(
+    env = rss_shield.make_vec(
         config.env_id,
         n_envs,
         backend=config.backend,
@@ -255,6 +260,7 @@ def environments(config: Config, params: Any, shield: Mapping[str, Any], n_envs:
         **conduct,
         **shield,
     )
+    return with_history(env, config.history)
 
 
 def check_spaces(config: Config, params: Any, policy: Tested, shield: Mapping[str, Any]) -> None:

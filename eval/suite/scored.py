@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv, VectorWrapper
 
 from rss_shield.agents.own_reward import Reward, rewards_by
+from rss_shield.agents.vec_env import action_masks
 from rss_shield.eval.own import blaming, function_named
 
 COLUMN = "own_return"
@@ -33,6 +34,10 @@ class Scored(VectorWrapper):
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         self.sums += rewards_by(self.function, rewards, actions, infos, terminated | truncated)
         return observations, rewards, terminated, truncated, infos
+
+    def action_masks(self) -> np.ndarray:
+        """What is permitted now, `[E, A]`: of environments that say so."""
+        return action_masks(self.env)
 
 
 def scored(make_vec: Callable[[int], Any], name: str) -> Callable[[int], Any]:

@@ -18,9 +18,10 @@ def learner(config: Config, arm: Arm) -> Learner:
     fixed = {name: value for name, value in arm.settings.items() if name != FROM_OPTIONS}
     asked = {name: getattr(config, option) for name, option in arm.settings.get(FROM_OPTIONS, {}).items()}
     try:
-        return learner_of(arm.learner, **fixed, **asked).with_hyperparameters(config.hyperparameters)
+        known = learner_of(arm.learner, **fixed, **asked).with_hyperparameters(config.hyperparameters)
     except ValueError as error:
         raise ValueError(f"arm {arm.name}: {error}") from None
+    return known.with_network(config.network)
 
 
 def driver(config: Config, preset: Preset, arm: Arm, seed: int) -> drivers.Driver:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rss_shield.agents.blocks import available_devices
+from rss_shield.agents.history import LONGEST
+from rss_shield.agents.networks import NETWORKS
 from rss_shield.agents.trackers import TRACKERS, check_tracker
 from rss_shield.command_line import fail, shown
 from rss_shield.envs.arguments import rules_of
@@ -74,6 +76,8 @@ def check(config: Config, program: str) -> None:
         ("removal_episodes", config.removal_episodes >= 0, "at least 0"),
         ("eval_episodes", config.eval_episodes >= 1, "at least 1"),
         ("replay_episodes", config.replay_episodes >= 0, "at least 0"),
+        ("history", 1 <= config.history <= LONGEST, f"1 to {LONGEST}"),
+        ("network", config.network in NETWORKS, f"one of {', '.join(NETWORKS)}"),
         ("n_envs", 1 <= config.n_envs <= 4096, "1 to 4096"),
         ("workers", 1 <= config.workers <= 256, "1 to 256"),
         ("tracker", config.tracker in TRACKERS, f"one of {', '.join(TRACKERS)}"),

@@ -8,6 +8,7 @@ import gymnasium as gym
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 import rss_shield
+from rss_shield.agents.history import with_history
 from rss_shield.envs.highway.idm_ego import make_idm_vec
 from rss_shield.envs.options import Options
 from rss_shield.eval.arms import Arm
@@ -30,7 +31,8 @@ def batch(
     """Environments of the chosen simulator side by side, as an arm needs them."""
     given = {**wrapped(config), **shield, **setting(config, arm)}
     options = {"backend": config.backend, **options, "params": preset, **given}
-    return rss_shield.make_vec(config.env_id, n_envs, **options)
+    env = rss_shield.make_vec(config.env_id, n_envs, **options)
+    return env if arm.scripted and not arm.own else with_history(env, config.history)
 
 
 def test_batch(config: Config, preset: Preset, arm: Arm, shield: Mapping[str, Any], n_envs: int) -> VectorEnv:

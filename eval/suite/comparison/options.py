@@ -48,6 +48,8 @@ examples:
       drivers that learn nothing beside agents, one of which pays until the shield changes 0.5 m/s^2 on average
   python train.py --arms shielded my_driver:drive --reward my_reward:reward --preset my-table.yaml
       your own: a policy, a reward, a table of parameters
+  python train.py --env-id intersection-v0 --history 2 --network attention
+      an agent that sees how others move, and to whom it is the same who is listed first
   python train.py --list-arms
       all there are
   python train.py --resume --name my-run
@@ -128,6 +130,11 @@ class Config:
     """How often an agent is tested with and without the shield on its way through training, at most; 0: never."""
     removal_episodes: int = 50
     """Test episodes of each of these tests, in the engine, on seeds of their own."""
+    history: int = 1
+    """How many of the last observations an agent sees, side by side."""
+    network: str = "mlp"
+    """What it sees a list of road users with: mlp (a plain network), or sets or attention, to which everybody in the
+    list is the same (observations in rows, such as Kinematics)."""
     hyperparameters: ConfigFile = field(default_factory=dict)
     """Of every arm's learner, instead of its own: a file as --config takes it, or single ones as
     --hyperparameters.learning-rate 3e-4. results.json shows all."""

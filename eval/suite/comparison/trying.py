@@ -6,6 +6,7 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 
+from rss_shield.agents.networks import check_network
 from rss_shield.command_line import shown
 from rss_shield.eval.arms import SHIELDED, Arm, arm_named
 from rss_shield.eval.suite.comparison.making import batch, original
@@ -61,6 +62,8 @@ def _tried_arm(config: Config, preset: Preset, arm: Arm) -> gym.Env:
     if not (isinstance(observations, gym.spaces.Box) and np.issubdtype(observations.dtype, np.floating)):
         raise ValueError(f"env_id = {config.env_id!r}: observations {observations}; expected a Box of floats")
     first = batch(config, preset, arm, SHIELDED, n_envs=1)
+    if not arm.scripted:
+        check_network(config.network, first.single_observation_space.shape or ())
     first.reset(seed=0)
     first.step(np.zeros((1, *(actions.shape or ())), actions.dtype))  # and the engine is compiled once for all workers
     first.close()
