@@ -45,21 +45,55 @@ def explore_less(model: Any, total_timesteps: int) -> None:
     done = min(model.num_timesteps / (EXPLORES * total_timesteps), 1.0)
     model.exploration_schedule = FloatSchedule(EPSILON + done * (LEAST_EPSILON - EPSILON))
     model.exploration_rate = model.exploration_schedule(1.0)
+    model.forget_exploration()
 
 
 class ExploresSingly:
     """Before a Q-learner of stable-baselines3: every environment draws for itself whether it explores.
 
-    Theirs draws once for all.
+    Theirs draws once for all. With `explore_for` N > 1 what was drawn is done 1 to N times in a row, each equally
+    likely, and so seldom begun that as many decisions explore: a single brake at a junction leads nowhere, four in a
+    row to another future (temporally extended exploration; Dabney, Ostrovski & Barreto, 2021).
     """
 
+    explore_for = 1
     exploration_rate: float
     action_space: Any
+    _left: np.ndarray | None = None  # how often each environment repeats what it drew
+
+    def forget_exploration(self) -> None:
+        """What was begun is not gone on with: a block depends on the saved model alone."""
+        self._left = None
+
+    def _excluded_save_params(self) -> list[str]:
+        return [*super()._excluded_save_params(), "_left", "_drawn"]  # type: ignore[misc]
 
     def predict(self, observation, state=None, episode_start=None, deterministic=False):
         actions, state = super().predict(observation, state, episode_start, True)  # type: ignore[misc]
         if deterministic or np.ndim(actions) == 0:
             return actions, state
         count = len(actions)  # torch's generator is seeded by `set_random_seed`
-        explores = torch.rand(count).numpy() < self.exploration_rate
-        return np.where(explores, torch.randint(int(self.action_space.n), (count,)).numpy(), actions), state
+        if self._left is None or len(self._left) != count:
+            self._left, self._drawn = np.zeros((2, count), int)
+        explores = torch.rand(count).numpy() < begin_rate(self.exploration_rate, self.explore_for)
+        drawn = torch.randint(int(self.action_space.n), (count,)).numpy()
+        begins = explores & (self._left == 0)
+        self._drawn = np.where(begins, drawn, self._drawn)
+        if self.explore_for > 1:
+            lasts = torch.randint(1, self.explore_for + 1, (count,)).numpy()
+            self._left = np.where(begins, lasts, self._left)
+        else:
+            self._left = begins.astype(int)
+        exploring = self._left > 0
+        self._left = self._left - exploring
+        return np.where(exploring, self._drawn, actions), state
+
+
+def begin_rate(share: float, longest: int) -> float:
+    """How likely exploration must begin, on a decision that does not explore yet, for a share of all to explore.
+
+    Exploring lasts (1 + longest) / 2 decisions on average: of begin * mean explored ones and 1 - begin others the
+    former are to be `share`.
+    """
+    mean = (1 + longest) / 2
+    return share / (mean * (1 - share) + share)

@@ -23,6 +23,7 @@ FROM_OPTIONS = "from options"
 WANTED_CHANGE: Mapping[str, Any] = {"penalty_on": "change", FROM_OPTIONS: {"target": "target_intervention"}}
 WANTED_SHARE: Mapping[str, Any] = {"penalty_on": "response", FROM_OPTIONS: {"target": "target_share"}}
 WANTED_COST: Mapping[str, Any] = {FROM_OPTIONS: {"cost_limit": "cost_limit"}}
+EXPLORING: Mapping[str, Any] = {FROM_OPTIONS: {"explore_for": "explore_for"}}
 CONTINUOUS: Mapping[str, Any] = {"action": {"type": "ContinuousAction"}}
 SEMANTIC: Mapping[str, Any] = {"semantic_actions": {"features": True}}
 
@@ -119,18 +120,19 @@ ROWS = (
     ),
     Arm("sailr", "PPO, an intervention ends the episode", "#CC79A7", "sailr-ppo", paying()),
     Arm("ppo-lagrangian", "PPO-Lagrangian without a shield", "#882255", "lagrangian-ppo", settings=WANTED_COST),
-    Arm("dqn", "DQN without a shield", "#AA4499", "dqn"),
-    Arm("dqn-shielded", "DQN behind the shield", "#332288", "dqn", SHIELDED),
+    Arm("dqn", "DQN without a shield", "#AA4499", "dqn", settings=EXPLORING),
+    Arm("dqn-shielded", "DQN behind the shield", "#332288", "dqn", SHIELDED, EXPLORING),
     Arm(
         "executed-action-dqn",
         "DQN, replaced and learnt as executed",
         "#1B9E77",
         "executed-dqn",
         BEFORE,
+        EXPLORING,
         tests=own(BEFORE),
     ),
-    Arm("qr-dqn", "QR-DQN without a shield", "#DDCC77", "qr-dqn"),
-    Arm("qr-dqn-shielded", "QR-DQN behind the shield", "#117733", "qr-dqn", SHIELDED),
+    Arm("qr-dqn", "QR-DQN without a shield", "#DDCC77", "qr-dqn", settings=EXPLORING),
+    Arm("qr-dqn-shielded", "QR-DQN behind the shield", "#117733", "qr-dqn", SHIELDED, EXPLORING),
     Arm("sac", "SAC without a shield", "#CC6677", "sac", config=CONTINUOUS),
     Arm("sac-replaced", "SAC, commands replaced", "#44AA99", "sac", IN_FULL, tests=own(IN_FULL), config=CONTINUOUS),
     Arm("sac-projected", "SAC, commands corrected as little as may be", "#999933", "sac", SHIELDED, config=CONTINUOUS),

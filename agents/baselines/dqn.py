@@ -11,22 +11,28 @@ LEARNING_RATE = 5e-4
 TARGET_UPDATES = 1024  # decisions from one target network to the next
 
 
-def learner() -> Learner:
-    """DQN."""
-    return learner_with(SinglyDQN, options)
+def learner(explore_for: int = 1) -> Learner:
+    """DQN.
+
+    Args:
+      explore_for: see `off_policy.ExploresSingly`.
+    """
+    return learner_with(SinglyDQN, options, explore_for)
 
 
-def learner_with(algorithm: type, given: Any) -> Learner:
+def learner_with(algorithm: type, given: Any, explore_for: int = 1) -> Learner:
     """A Q-learner with a replay buffer."""
+    lasts = f", each for 1 to {explore_for} decisions" if explore_for > 1 else ""
     return Learner(
         algorithm,
         given,
         off_policy.rollout,
         off_policy.rollouts_per_block,
         begin_block=off_policy.explore_less,
+        attributes=lambda: {"explore_for": explore_for},
         notes={
             "exploration": f"{off_policy.EPSILON:g} to {off_policy.LEAST_EPSILON:g} over {off_policy.EXPLORES:.0%} of "
-            "the decisions, block by block, drawn in every environment"
+            f"the decisions, block by block, drawn in every environment{lasts}"
         },
     )
 

@@ -13,9 +13,9 @@ from rss_shield.agents.baselines.executed_ppo import EXECUTED
 from rss_shield.agents.learner import Learner
 
 
-def learner() -> Learner:
-    """DQN on executed actions."""
-    return dqn.learner_with(ExecutedDQN, dqn.options)
+def learner(explore_for: int = 1) -> Learner:
+    """DQN on executed actions; arguments as DQN's."""
+    return dqn.learner_with(ExecutedDQN, dqn.options, explore_for)
 
 
 class ExecutedDQN(dqn.SinglyDQN):

@@ -11,9 +11,9 @@ from rss_shield.agents.learner import Learner
 QUANTILES = 32
 
 
-def learner() -> Learner:
-    """QR-DQN with the hyperparameters of DQN."""
-    return dqn.learner_with(SinglyQRDQN, options)
+def learner(explore_for: int = 1) -> Learner:
+    """QR-DQN with the hyperparameters of DQN; arguments as DQN's."""
+    return dqn.learner_with(SinglyQRDQN, options, explore_for)
 
 
 def options(n_envs: int, total_timesteps: int) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 import csv
 import functools
+import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from stable_baselines3.common.save_util import load_from_zip_file
 import rss_shield
 import rss_shield.agents.off_policy
 import rss_shield.agents.ppo
+from rss_shield.agents import off_policy
 from rss_shield.agents.baselines.adaptive_ppo import SIGNALS
 from rss_shield.agents.baselines.executed_dqn import ExecutedDQN
 from rss_shield.agents.baselines.executed_ppo import ExecutedPPO
@@ -36,7 +39,7 @@ CASES = {
     "sailr-ppo": ({}, {}),
     "lagrangian-ppo": ({"cost_limit": 0.01}, {"shield": "monitor"}),
     "executed-ppo": ({}, BEFORE),
-    "dqn": ({}, {}),
+    "dqn": ({"explore_for": 4}, {}),
     "executed-dqn": ({}, BEFORE),
     "qr-dqn": ({}, {}),
     "semantic-dqn": ({}, {"semantic_actions": {"features": True}}),
@@ -300,6 +303,32 @@ def test_environments_explore_one_by_one():
     assert 0.15 < explored < 0.65  # half of them explore, and one in five of these finds the greedy action
     model.exploration_rate = 0.0
     assert np.array_equal(model.predict(observations)[0], greedy)
+
+
+@pytest.mark.parametrize("longest", [1, 4, 9])
+@pytest.mark.parametrize("share", [0.05, 0.4, 0.9])
+def test_exploration_lasts_as_long_as_asked_and_is_as_frequent(longest, share):
+    """Against a network that always chooses 0, what is drawn is seen wherever it is not 0."""
+
+    class Greedy:
+        def predict(self, observation, state, episode_start, deterministic):
+            return np.full(len(observation), -1), state
+
+    class Explorer(off_policy.ExploresSingly, Greedy):
+        explore_for, exploration_rate = longest, share
+        action_space = SimpleNamespace(n=10**6)  # nothing is drawn twice
+
+    torch.manual_seed(0)
+    explorer = Explorer()
+    chosen = np.array([explorer.predict(np.zeros((500, 1)))[0] for _ in range(400)])
+    assert np.mean(chosen >= 0) == pytest.approx(share, abs=0.02)
+    runs = [(drawn, len(list(run))) for column in chosen.T for drawn, run in itertools.groupby(column)]
+    lengths = [length for drawn, length in runs if drawn >= 0]
+    assert max(lengths) == longest
+    assert np.mean(lengths) == pytest.approx((1 + longest) / 2, rel=0.05)
+    explorer.forget_exploration()
+    explorer.exploration_rate = 0.0
+    assert (explorer.predict(np.zeros((500, 1)))[0] == -1).all()
 
 
 # ---------------------------------------------------------------- masks

@@ -21,7 +21,7 @@ def learner(config: Config, arm: Arm) -> Learner:
         known = learner_of(arm.learner, **fixed, **asked).with_hyperparameters(config.hyperparameters)
     except ValueError as error:
         raise ValueError(f"arm {arm.name}: {error}") from None
-    return known.with_network(config.network)
+    return known if arm.chooses else known.with_network(config.network)
 
 
 def driver(config: Config, preset: Preset, arm: Arm, seed: int) -> drivers.Driver:

@@ -76,6 +76,7 @@ def check(config: Config, program: str) -> None:
         ("removal_episodes", config.removal_episodes >= 0, "at least 0"),
         ("eval_episodes", config.eval_episodes >= 1, "at least 1"),
         ("replay_episodes", config.replay_episodes >= 0, "at least 0"),
+        ("explore_for", 1 <= config.explore_for <= 1000, "1 to 1000"),
         ("history", 1 <= config.history <= LONGEST, f"1 to {LONGEST}"),
         ("network", config.network in NETWORKS, f"one of {', '.join(NETWORKS)}"),
         ("n_envs", 1 <= config.n_envs <= 4096, "1 to 4096"),

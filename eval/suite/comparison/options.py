@@ -130,11 +130,13 @@ class Config:
     """How often an agent is tested with and without the shield on its way through training, at most; 0: never."""
     removal_episodes: int = 50
     """Test episodes of each of these tests, in the engine, on seeds of their own."""
+    explore_for: int = 1
+    """Of DQN and QR-DQN: a random action is done for 1 to so many decisions in a row."""
     history: int = 1
     """How many of the last observations an agent sees, side by side."""
     network: str = "mlp"
     """What it sees a list of road users with: mlp (a plain network), or sets or attention, to which everybody in the
-    list is the same (observations in rows, such as Kinematics)."""
+    list is the same (observations in rows, such as Kinematics). Arms of semantic actions have their own."""
     hyperparameters: ConfigFile = field(default_factory=dict)
     """Of every arm's learner, instead of its own: a file as --config takes it, or single ones as
     --hyperparameters.learning-rate 3e-4. results.json shows all."""

@@ -62,7 +62,7 @@ def _tried_arm(config: Config, preset: Preset, arm: Arm) -> gym.Env:
     if not (isinstance(observations, gym.spaces.Box) and np.issubdtype(observations.dtype, np.floating)):
         raise ValueError(f"env_id = {config.env_id!r}: observations {observations}; expected a Box of floats")
     first = batch(config, preset, arm, SHIELDED, n_envs=1)
-    if not arm.scripted:
+    if not (arm.scripted or arm.chooses):
         check_network(config.network, first.single_observation_space.shape or ())
     first.reset(seed=0)
     first.step(np.zeros((1, *(actions.shape or ())), actions.dtype))  # and the engine is compiled once for all workers
