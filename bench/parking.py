@@ -227,7 +227,8 @@ def row(case: Case, frame: pd.DataFrame) -> tuple[str, ...]:
 
 def _count(k: int, n: int) -> str:
     """A number of episodes, and where the interval of its rate ends."""
-    return f"{k} (< {100 * wilson(k, n).high:.{2 if k < n else 3}g} %)"
+    highest = 100 * wilson(k, n).high
+    return f"{k} (< {highest:.{0 if highest >= 10 else 1}f} %)"
 
 
 def _percent(rate: Interval) -> str:
