@@ -5,8 +5,9 @@
     python bench/kept.py unpack               into runs/: the commands that measured go on from there
     python bench/kept.py list                 what is kept, and what is in runs/
 
-Only tables and numbers are kept (CSV, JSON and lines of JSON), no models, traces or pictures. The same files make the
-same archive, to the byte. `unpack` leaves alone what is in runs/ already. What was measured before the shield, a road
+Only tables and numbers are kept (CSV, JSON and lines of JSON), no models, traces or pictures; of parts of the campaign
+what their page is written from, without actions and grounds of verdicts, to five digits. The same files make the same
+archive, to the byte. `unpack` leaves alone what is in runs/ already. What was measured before the shield, a road
 or a driver was changed is no longer true: delete its archive, and measure anew.
 """
 
@@ -18,6 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
+import pandas as pd
 import tyro
 
 from rss_shield.eval.files import atomic, folder_for, refuse
@@ -26,6 +28,10 @@ SUFFIXES = (".csv", ".json", ".jsonl")
 DATA = Path(__file__).resolve().parents[1] / "docs" / "results" / "data"
 ENTRIES = ("environments", "people.jsonl", "parking", "stress", "evidence", "semantic", "evasion")  # in runs/
 NAMES = {Path(entry).stem: entry for entry in ENTRIES}  # of an archive: the file or folder that is in it
+CAMPAIGN = "campaign-"  # so begin folders of its parts, each an archive of its own
+OF_CAMPAIGN = ("config.json", "results.json", "card.json", "episodes.csv", "learning_curve.csv")
+OF_CAMPAIGN += ("removal_curve.csv", "multiplier.csv")
+LEFT_OUT = ["actions", "evidence"]  # columns
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,12 +44,29 @@ class Config:
     data: Path = DATA  # folder of the archives
 
 
+def known(runs: Path, data: Path) -> list[str]:
+    """Names of archives: the fixed ones, and finished parts of the campaign that are in `runs` or kept."""
+    parts = {path.parent.name for path in runs.glob(f"{CAMPAIGN}*/results.json")}
+    parts |= {path.name.removesuffix(".tar.xz") for path in data.glob(f"{CAMPAIGN}*.tar.xz")}
+    return [*NAMES, *sorted(parts)]
+
+
 def files_of(name: str, runs: Path) -> Iterator[Path]:
     """Tables and numbers of an archive, relative to `runs`, in order; what was half written is none."""
-    path = runs / NAMES[name]
+    path = runs / NAMES.get(name, name)
     for file in [path] if path.is_file() else sorted(path.rglob("*")):
-        if file.is_file() and file.suffix in SUFFIXES and not file.name.startswith("."):
+        if not file.is_file() or file.suffix not in SUFFIXES or file.name.startswith("."):
+            continue
+        if name in NAMES or (file.name in OF_CAMPAIGN and file.parent.name != "episodes"):
             yield file.relative_to(runs)
+
+
+def content_of(file: Path, name: str) -> bytes:
+    """What is kept of a file."""
+    if name in NAMES or file.suffix != ".csv":
+        return file.read_bytes()
+    table = pd.read_csv(file, keep_default_na=False, na_values=[""]).drop(columns=LEFT_OUT, errors="ignore")
+    return table.to_csv(index=False, float_format="%.5g", lineterminator="\n").encode()
 
 
 def archive(name: str, data: Path) -> Path:
@@ -62,7 +85,7 @@ def kept(name: str, data: Path) -> dict[str, bytes]:
 
 def pack(name: str, runs: Path, data: Path) -> int:
     """Put what is in `runs` into an archive, beside what it holds already; returns the number of its files."""
-    files = kept(name, data) | {path.as_posix(): (runs / path).read_bytes() for path in files_of(name, runs)}
+    files = kept(name, data) | {path.as_posix(): content_of(runs / path, name) for path in files_of(name, runs)}
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as tar:
         for path, content in sorted(files.items()):
@@ -88,10 +111,11 @@ def unpack(name: str, runs: Path, data: Path) -> int:
 
 
 def main(config: Config) -> None:
-    names = config.names or tuple(NAMES)
-    unknown = [name for name in names if name not in NAMES]
+    there_are = known(config.runs, config.data)
+    names = config.names or tuple(there_are)
+    unknown = [name for name in names if name not in there_are]
     if unknown:
-        raise ValueError(f"{' '.join(unknown)}: expected some of {', '.join(NAMES)}")
+        raise ValueError(f"{' '.join(unknown)}: expected some of {', '.join(there_are)}")
     for name in names:
         there = len(list(files_of(name, config.runs)))
         if config.what == "list":

@@ -8,7 +8,7 @@ import tarfile
 import pytest
 from places import ROOT
 
-from bench.kept import Config, archive, kept, main, pack, unpack
+from bench.kept import Config, archive, kept, known, main, pack, unpack
 
 
 @pytest.fixture
@@ -53,6 +53,30 @@ def test_what_is_in_runs_is_left_alone(runs, tmp_path):
     (runs / "parking" / "old" / "b.json").unlink()
     assert unpack("parking", runs, tmp_path) == 1
     assert (runs / "parking" / "a.csv").read_text() == "seed\n1\n2\n"
+
+
+def test_of_a_part_of_the_campaign_is_kept_what_its_page_is_written_from(tmp_path):
+    runs, part = tmp_path / "runs", "campaign-short-highway-main"
+    model = runs / part / "shielded-seed0"
+    (runs / part / "episodes").mkdir(parents=True)
+    model.mkdir()
+    (runs / part / "episodes.csv").write_text(
+        "seed,return,blame,crashed,actions,evidence,min_ttc\n1000000007,22.123456789,no contact,False,1 2,{},\n"
+    )
+    (runs / part / "episodes" / "episodes.csv").write_text("seed\n1\n")
+    (runs / part / "table.csv").write_text("metric\n")
+    (model / "learning_curve.csv").write_text("timesteps,return\n8192,1.5\n")
+    (model / "model.zip").write_bytes(b"large")
+    assert known(runs, tmp_path)[-1] != part  # it is not finished
+    (runs / part / "results.json").write_text('{"n": 1.123456789}')
+    assert known(runs, tmp_path)[-1] == part
+    assert pack(part, runs, tmp_path) == 3
+    assert kept(part, tmp_path) == {
+        f"{part}/episodes.csv": b"seed,return,blame,crashed,min_ttc\n1000000007,22.123,no contact,False,\n",
+        f"{part}/results.json": b'{"n": 1.123456789}',
+        f"{part}/shielded-seed0/learning_curve.csv": b"timesteps,return\n8192,1.5\n",
+    }
+    assert known(tmp_path / "nowhere", tmp_path)[-1] == part
 
 
 def test_nothing_is_put_outside(tmp_path):
