@@ -1,5 +1,6 @@
 """An experiment is a file that names environments, arms or policies, seeds, budgets, tests, and what is varied."""
 
+import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -144,6 +145,9 @@ def as_words(options: Mapping[str, Any]) -> list[str]:
     words = []
     for name, value in options.items():
         flag = name.replace("_", "-")
+        if name.startswith(("config.", "hyperparameters.")) and not isinstance(value, str):
+            words += [f"--{flag}", json.dumps(value)]
+            continue
         if isinstance(value, bool) and not name.startswith("rules."):
             words.append(f"--{flag}" if value else f"--no-{flag}")
             continue
