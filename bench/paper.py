@@ -23,10 +23,10 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from bench.campaign import PLANS, folder_of  # noqa: E402
-from rss_shield.eval.runs.experiment import read_experiment  # noqa: E402
+from rss_shield.eval.runs.experiment import Experiment, read_experiment  # noqa: E402
 
-SWEEPS = ("ablation", "rules", "presets", "response-times")
-ON_THEIR_PAGE = ("presets", "response-times")
+SWEEPS = ("ablation", "rules", "presets", "response-times", "intersection")
+ON_THEIR_PAGE = ("presets", "response-times", "intersection")
 COMPARED = {"highway-fast-v0": 200_000, "intersection-v0": 50_000}  # decisions of the runs on the page of PPO
 ADVERSARIES = 2000  # episodes a row of the ablation
 TIMES = "paper-times.csv"
@@ -50,9 +50,8 @@ def steps_of(arguments: argparse.Namespace) -> Iterator[Step]:
     yield Step("campaign: page", [*campaign, "--write", *more])
     for name in SWEEPS:
         file = f"experiments/{name}.yaml"
-        count = read_experiment(ROOT / file).tests["episodes"] // divide
-        episodes = ["--episodes", str(max(count, 2))] if divide > 1 else []
-        yield Step(f"sweep: {name}", [*RSS_SHIELD, "sweep", file, "--runs-dir", str(runs), *workers, *episodes])
+        words = [*RSS_SHIELD, "sweep", file, "--runs-dir", str(runs), *workers]
+        yield Step(f"sweep: {name}", [*words, *_divided(read_experiment(ROOT / file), divide)])
     count = str(max(ADVERSARIES // divide, 2))
     words = ["bench/ablation.py", "--episodes", count, "--runs", str(runs), "--write", "--out", out]
     yield Step("ablation: page", words)
@@ -69,6 +68,16 @@ def steps_of(arguments: argparse.Namespace) -> Iterator[Step]:
 
 
 RSS_SHIELD = ["-c", "from rss_shield.cli import main; main()"]  # the console command of this very interpreter
+
+
+def _divided(experiment: Experiment, divide: int) -> list[str]:
+    """Options of `rss-shield sweep`: little of everything where all is divided."""
+    if divide == 1:
+        return []
+    words = ["--episodes", str(max(experiment.tests["episodes"] // divide, 2))]
+    if not experiment.arms:
+        return words
+    return [*words, "--total-timesteps", str(max(experiment.options["total_timesteps"] // divide, 1))]
 
 
 def _small(divide: int, pages: bool = False) -> list[str]:

@@ -14,7 +14,7 @@ from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.runs.experiment import experiment_of
 from rss_shield.eval.runs.points import metric_named
 from rss_shield.eval.runs.tables import labels_of
-from rss_shield.eval.suite.sweep import with_episodes
+from rss_shield.eval.suite.sweep import with_budget
 
 VERSIONS = {
     "python": "3.12.1",
@@ -65,6 +65,9 @@ def test_a_divided_trial_has_little_of_everything_and_seeds_of_its_own():
     typed = words(divide=1000)
     assert all("--divide 1000" in text for text in typed if "campaign.py" in text)
     assert all("--episodes 2" in text for text in typed if text.startswith("rss-shield sweep"))
+    assert [text for text in typed if "--total-timesteps 100 " in f"{text} "] == [
+        "rss-shield sweep experiments/intersection.yaml --runs-dir runs --workers 2 --episodes 2 --total-timesteps 100"
+    ]
     (compared,) = (text for text in typed if "--env-id highway-fast-v0" in text)
     assert "--total-timesteps 200 " in compared and "--eval-episodes 4" in compared and compared.endswith("--seeds 0 1")
 
@@ -138,9 +141,15 @@ def test_a_sweep_that_is_not_finished_is_named(tmp_path):
         sweeps.write([tmp_path], tmp_path)
 
 
-def test_other_numbers_of_episodes():
+def test_other_numbers_of_episodes_and_decisions():
     experiment = experiment_of({"name": "x", "policies": ["faster"]})
-    assert with_episodes(experiment, None) == experiment
-    assert with_episodes(experiment, 3).tests == {"episodes": 3, "first_seed": 10**9}
+    assert with_budget(experiment, None) == experiment
+    assert with_budget(experiment, 3).tests == {"episodes": 3, "first_seed": 10**9}
     with pytest.raises(ValueError, match="--episodes 0 is out of range"):
-        with_episodes(experiment, 0)
+        with_budget(experiment, 0)
+    with pytest.raises(ValueError, match="--total-timesteps 5: x trains no arms"):
+        with_budget(experiment, None, 5)
+    trains = experiment_of({"name": "x", "arms": ["dqn"], "options": {"total_timesteps": 7, "n_envs": 2}})
+    assert with_budget(trains, None, 5).options == {"total_timesteps": 5, "n_envs": 2}
+    with pytest.raises(ValueError, match="--total-timesteps 0 is out of range"):
+        with_budget(trains, None, 0)

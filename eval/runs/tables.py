@@ -123,12 +123,17 @@ def _panel(plot: Axes, table: pd.DataFrame, axes: list[str], safety: str, perfor
         plot.errorbar(x.scale * rows[x.name], y.scale * rows[y.name], **style)
     front = table[table["front"]].sort_values([x.name, y.name])
     plot.plot(x.scale * front[x.name], y.scale * front[y.name], color=FRONT, linewidth=0.8)
+    middle = sum(plot.get_xlim()) / 2
     for place, text in labels_of(front, axes, x, y):
-        plot.annotate(text, place, textcoords="offset points", xytext=(4, 4), fontsize=6)
+        left = place[0] > middle  # toward the middle: there is room
+        beside: Any = {"xytext": (-4 if left else 4, 4), "ha": "right" if left else "left", "fontsize": 6}
+        lines = "\n".join(line for one in text.split("\n") for line in textwrap.wrap(one, WIDTH))
+        plot.annotate(lines, place, textcoords="offset points", **beside).set_in_layout(False)
     plot.set_xlabel(f"{x.label} [{x.unit}]" if x.unit else x.label)
     plot.set_ylabel(f"{y.label} [{y.unit}]" if y.unit else y.label)
 
 
+WIDTH = 32  # letters of a line of a label
 NEAR = 0.04  # of the front's extent: points that are nearer than this in both directions share a label
 
 

@@ -49,6 +49,8 @@ class Arguments:
     """Of a running Ray cluster; auto: the one this machine is part of; by default one is started here."""
     episodes: int | None = None
     """Test episodes of each task, in place of the file's: few of them, to try it."""
+    total_timesteps: int | None = None
+    """Decisions to learn from in each training, likewise."""
     runs_dir: Path = Path("runs")
     """The results are below it, in a folder of the experiment's name."""
 
@@ -213,17 +215,22 @@ def sweep(experiment: Experiment, folder: Path, work: Work = do_task, file: str 
     return under_way
 
 
-def with_episodes(experiment: Experiment, episodes: int | None) -> Experiment:
-    """Other numbers of test episodes; None = as in the file.
+def with_budget(experiment: Experiment, episodes: int | None, total_timesteps: int | None = None) -> Experiment:
+    """Other numbers of test episodes, and of decisions to learn from; None = as in the file.
 
     Raises:
-      ValueError: out of range.
+      ValueError: an option out of range, or decisions where nobody learns.
     """
-    if episodes is None:
+    for option, value in (("episodes", episodes), ("total-timesteps", total_timesteps)):
+        if value is not None and value < 1:
+            raise ValueError(f"--{option} {value} is out of range: expected at least 1")
+    if episodes is not None:
+        experiment = replace(experiment, tests={**experiment.tests, "episodes": episodes})
+    if total_timesteps is None:
         return experiment
-    if episodes < 1:
-        raise ValueError(f"--episodes {episodes} is out of range: expected at least 1")
-    return replace(experiment, tests={**experiment.tests, "episodes": episodes})
+    if not experiment.arms:
+        raise ValueError(f"--total-timesteps {total_timesteps}: {experiment.name} trains no arms")
+    return replace(experiment, options={**experiment.options, "total_timesteps": total_timesteps})
 
 
 def checked_workers(workers: int) -> int:
@@ -254,7 +261,7 @@ def run(arguments: list[str]) -> None:
     """What a command line asks for."""
     given = tyro.cli(Arguments, prog="rss-shield sweep", description=__doc__, args=arguments)
     try:
-        experiment = with_episodes(read_experiment(given.experiment), given.episodes)
+        experiment = with_budget(read_experiment(given.experiment), given.episodes, given.total_timesteps)
         done = sweep(
             experiment,
             given.runs_dir / experiment.name,
