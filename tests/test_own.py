@@ -250,6 +250,25 @@ def test_tests_count_it_beside_the_return():
     assert env.sums.tolist() == [0.0, 29.5]
 
 
+@pytest.mark.slow
+def test_an_agent_with_masks_a_history_and_a_network_of_its_own_learns_from_it_and_is_tested_again(tmp_path):
+    words = "--arms maskable --seeds 0 --total-timesteps 512 --eval-episodes 4 --n-envs 4 --workers 1 --name run"
+    words += " --removal-checks 1 --removal-episodes 2 --replay-episodes 1 --no-pages --config.duration 6"
+    words += " --reward brought:length --history 2 --network sets"
+    train.main([*words.split(), "--runs-dir", str(tmp_path)])
+    model = tmp_path / "run" / "maskable-seed0" / "model.zip"
+    card = json.loads((model.parent / "card.json").read_text())
+    assert card["history"] == 2 and "the last 2 observations" in (model.parent / "card.md").read_text()
+    before = pd.read_csv(tmp_path / "run" / "episodes.csv")
+    assert (before["own_return"] == before["length"]).all()
+    rss_shield.test.main([str(model), "--episodes", "4", "--out", "again", "--reward", "brought:length"])
+    again = pd.read_csv("again/episodes.csv")
+    same = ["seed", "return", "length", "blame", "own_return", "actions", "test"]
+    pd.testing.assert_frame_equal(again[same], before[same])
+    with pytest.raises(SystemExit):
+        rss_shield.test.main([str(model), "--history", "3", "--out", "again"])
+
+
 def test_the_test_command_takes_tables_parameters_and_rewards(tmp_path):
     (tmp_path / "mine.yaml").write_text("{like: slides, ego: {response_time: 0.5}}")
     (tmp_path / "road.yaml").write_text("{lanes_count: 2, duration: 5, vehicles_count: 5}")
