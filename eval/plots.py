@@ -197,8 +197,8 @@ def _line(axes: Axes, points: list[tuple[float, Interval]], label: str, arm: str
 
 
 def style_of(arm: str) -> dict[str, Any]:
-    """Colour and marker of an arm, so that more arms than colours are told apart."""
-    markers, row = "osD^v<>pPXhd", arm_named(arm)
+    """Colour and marker of an arm: no two arms whose colours are alike have the same marker."""
+    markers, row = "osD^v<>pPXh", arm_named(arm)
     return {"color": row.colour, "marker": "*" if row.own else markers[list(ARMS).index(arm) // 2 % len(markers)]}
 
 

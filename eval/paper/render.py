@@ -24,7 +24,7 @@ tbody tr:nth-child(even) { background: #f6f8fa; }
 figure { margin: 1.5rem 0; } figure img { max-width: min(100%, 54rem); height: auto; }
 figcaption, caption { color: #444;
   font-size: .85rem; text-align: left; } caption { caption-side: bottom; padding-top: .3rem; }
-pre { background: #f6f8fa; padding: .6rem; overflow-x: auto; font-size: .85rem; }
+pre { background: #f6f8fa; padding: .6rem; font-size: .85rem; white-space: pre-wrap; overflow-wrap: anywhere; }
 @media print { body { max-width: none; margin: 0; font-size: 11px; } h2 { break-before: page; } nav { display: none; }
   figure, table { break-inside: avoid; } }
 """

@@ -1,8 +1,11 @@
 """The arms: every row can be trained and tested, and the page has the table."""
 
+import itertools
 import re
 
+import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from places import ROOT
 
 from rss_shield.agents.learner import LEARNERS
@@ -18,6 +21,28 @@ def test_names_and_colours_are_told_apart():
     assert len({tuple(style_of(arm.name).values()) for arm in ROWS}) == len(ROWS)
     assert all(re.fullmatch("#[0-9A-F]{6}", arm.colour) for arm in ROWS)
     assert all(re.fullmatch(r"[a-z0-9.-]+", arm.name) for arm in ROWS)
+
+
+def oklab(colour):
+    """Perceived lightness and hue (Ottosson, 2020): distances below 0.08 are hard to tell apart in thin lines."""
+    channels = np.array(to_rgb(colour))
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    cones = np.cbrt(CONES @ linear)
+    return OPPONENTS @ cones
+
+
+CONES = np.array([[0.41222, 0.53633, 0.05145], [0.21190, 0.68070, 0.10740], [0.08830, 0.28172, 0.62998]])
+OPPONENTS = np.array([[0.21045, 0.79362, -0.00407], [1.97800, -2.42859, 0.45059], [0.02590, 0.78277, -0.80868]])
+
+
+def test_arms_whose_colours_are_alike_have_different_markers():
+    pairs = [
+        (one.name, other.name)
+        for one, other in itertools.combinations(ROWS, 2)
+        if np.linalg.norm(oklab(one.colour) - oklab(other.colour)) < 0.08
+    ]
+    assert ("penalty-0.5", "literal-def10") in pairs
+    assert [pair for pair in pairs if style_of(pair[0])["marker"] == style_of(pair[1])["marker"]] == []
 
 
 def test_the_two_of_always_are_called_by_the_shield_in_training():

@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-import subprocess
 
 import numpy as np
 import pandas as pd
@@ -144,10 +143,20 @@ BROWSER = next(
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
 def test_a_browser_shows_the_page(folder, tmp_path):
-    page, picture = write((folder,), tmp_path / "report", "Seen"), tmp_path / "page.png"
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1200,5000"]
-    where = [f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={picture}", page.as_uri()]
-    subprocess.run([BROWSER, *options, *where], check=True, capture_output=True, timeout=120)
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
+    shown, picture = write((folder,), tmp_path / "report", "Seen"), tmp_path / "page.png"
+    asked: list[str] = []
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1200, "height": 900})
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(shown.as_uri())
+        page.screenshot(path=picture, full_page=True)
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        cut = page.evaluate("[...document.querySelectorAll('pre')].some(one => one.scrollWidth > one.clientWidth)")
+        browser.close()
+    assert [url for url in asked if not url.startswith("data:")] == [shown.as_uri()]  # it is complete in itself
+    assert wide <= 1200 and not cut  # nothing is beyond the edge
     pixels = np.asarray(Image.open(picture).convert("RGB")).reshape(-1, 3)
     seen = {tuple(colour) for colour in np.unique(pixels, axis=0)}
     # the ego's blame, the shielded arm's curve: figures are drawn, not only named
