@@ -7,7 +7,7 @@ from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
-from rss_shield.agents.vec_env import action_masks
+from rss_shield.agents.masks import action_masks
 
 LONGEST = 64  # whatever is more is a mistake
 
@@ -48,16 +48,14 @@ class History(VectorWrapper):
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """As the environment, `infos["final_obs"]` with its history as well."""
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
-        ended = terminated | truncated
-        begun = self._over
-        if self.env.metadata.get("autoreset_mode") == AutoresetMode.SAME_STEP:
-            begun = ended
-            if ended.any():
-                infos = {**infos, "final_obs": self._final(infos["final_obs"], ended)}
-        self._over = ended if self.env.metadata.get("autoreset_mode") == AutoresetMode.NEXT_STEP else self._over
+        ended, mode = terminated | truncated, self.env.metadata.get("autoreset_mode")
+        if mode == AutoresetMode.SAME_STEP and ended.any():
+            infos = {**infos, "final_obs": self._final(infos["final_obs"], ended)}
         self._kept[:, :-1] = self._kept[:, 1:]
         self._kept[:, -1] = observations
-        self._begin(begun, observations)
+        self._begin(ended if mode == AutoresetMode.SAME_STEP else self._over, observations)
+        if mode == AutoresetMode.NEXT_STEP:
+            self._over = ended
         return self._kept.copy(), rewards, terminated, truncated, infos
 
     def action_masks(self) -> np.ndarray:

@@ -1,14 +1,13 @@
 """A gymnasium vector environment as a stable-baselines3 `VecEnv`."""
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from stable_baselines3.common.vec_env import VecEnv
 
+from rss_shield.agents.masks import MASKS, action_masks
 from rss_shield.agents.own_reward import Reward, rewards_by, told_by
-
-MASKS = "action_masks"  # the one method that answers for all environments at once
 
 
 class Charge(Protocol):
@@ -126,12 +125,6 @@ class VectorEnvAdapter(VecEnv):
 
     def env_is_wrapped(self, wrapper_class, indices=None):
         return [False] * len(list(self._get_indices(indices)))
-
-
-def action_masks(env: Any) -> np.ndarray:
-    """`action_masks()` of all environments, `[E, A]`: of the engine at once, of others one after the other."""
-    together = getattr(env, MASKS, None)
-    return np.stack(env.call(MASKS)) if together is None else together()
 
 
 def one(infos: dict, e: int) -> dict:

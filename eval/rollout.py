@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rss_shield.agents.vec_env import action_masks
+from rss_shield.agents.masks import action_masks
 
 NO_CONTACT = "no contact"  # blame in tables: an empty text would come back from a CSV file as a missing value
 # what was changed, and how the ride felt

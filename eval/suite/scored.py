@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import VectorEnv, VectorWrapper
 
+from rss_shield.agents.masks import action_masks
 from rss_shield.agents.own_reward import Reward, rewards_by
-from rss_shield.agents.vec_env import action_masks
 from rss_shield.eval.own import blaming, function_named
 
 COLUMN = "own_return"
