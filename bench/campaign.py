@@ -51,7 +51,7 @@ class Part(NamedTuple):
 
 # without these no learner finds more at the intersection than to drive on, and collide in every other episode:
 # experiments/intersection.yaml
-SEEING = ("--network", "sets", "--explore-for", "5", "--config.observation.observe-intentions", "true")
+SEEING = ("--network", "sets", "--config.observation.observe-intentions", "true")
 SEEING += ("--config.observation.features", *("presence", "x", "y", "vx", "vy", "cos_h", "sin_h", "cos_d", "sin_d"))
 SEEING += ("--hyperparameters.gamma", "0.95", "--hyperparameters.learning-rate", "0.001")
 SEEING += ("--hyperparameters.batch-size", "1024", "--hyperparameters.gradient-steps", "2")
