@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rss_shield.agents.masks import action_masks
-
 NO_CONTACT = "no contact"  # blame in tables: an empty text would come back from a CSV file as a missing value
 # what was changed, and how the ride felt
 RIDE = (
@@ -68,7 +66,7 @@ def evaluate(
     try:
         observations, _ = env.reset(seed=[int(seed) for seed in seeds[:envs]])
         while len(records) < len(seeds):
-            chosen = policy(observations, action_masks(env)) if masked else policy(observations)
+            chosen = policy(observations, _masks(env)) if masked else policy(observations)
             observations, rewards, terminated, truncated, infos = env.step(chosen)
             returns += rewards
             speeds += infos["speed"]
@@ -91,6 +89,11 @@ def evaluate(
     finally:
         env.close()
     return pd.DataFrame([records[i] for i in range(len(seeds))])
+
+
+def _masks(env: Any) -> np.ndarray:
+    """`action_masks()` of all environments, `[E, A]`: of the engine at once, of others one after the other."""
+    return env.action_masks() if hasattr(env, "action_masks") else np.stack(env.call("action_masks"))
 
 
 def run_episode(make_env: MakeEnv, policy: Policy, seed: int) -> dict[str, Any]:
