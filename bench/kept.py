@@ -65,7 +65,9 @@ def content_of(file: Path, name: str) -> bytes:
     """What is kept of a file."""
     if name in NAMES or file.suffix != ".csv":
         return file.read_bytes()
-    table = pd.read_csv(file, keep_default_na=False, na_values=[""]).drop(columns=LEFT_OUT, errors="ignore")
+    table = pd.read_csv(file, keep_default_na=False, na_values=[""], low_memory=False).drop(
+        columns=LEFT_OUT, errors="ignore"
+    )
     return table.to_csv(index=False, float_format="%.5g", lineterminator="\n").encode()
 
 

@@ -19,7 +19,7 @@ import pandas as pd
 from rss_shield.eval import multipliers, removal
 from rss_shield.eval.arms import ARMS, OFF, ON, Arm
 from rss_shield.eval.frontier import plot_frontier
-from rss_shield.eval.metrics import summarise, with_outcomes
+from rss_shield.eval.metrics import METRICS, summarise, with_outcomes
 from rss_shield.eval.pages import command, markdown, write_page
 from rss_shield.eval.paper.compared import difference
 from rss_shield.eval.plots import joined_bins
@@ -33,6 +33,7 @@ SELDOM = 0.10  # share of frames overridden, at most
 NEARLY = 0.02  # of the best return, lost at most
 HARMLESS = 0.01  # crashes without the shield, at most
 FLAT = 0.02  # change of the return over the last fifth of training, at most, in parts of its size
+LIMITS = {metric.name: metric.limits for metric in METRICS}  # what a value can be
 CALLED = {arm.called: arm for arm in ARMS.values()}
 DRAWN = (  # what the frontier is drawn from
     *("train", "test", "train_seed", "seed", "crashed", "blame"),
@@ -133,7 +134,8 @@ def estimate(cell: pd.DataFrame, metric: str) -> Interval:
         return exact or Interval(mean, mean - half, mean + half, pooled.size)
     over = cluster_bootstrap(seeds, np.random.default_rng(0))
     if exact is None:
-        return over
+        lowest, highest = LIMITS.get(metric, (-np.inf, np.inf))
+        return over._replace(low=max(over.low, lowest), high=min(over.high, highest))
     return over._replace(low=max(min(over.low, exact.low), 0.0), high=min(max(over.high, exact.high), 1.0))
 
 

@@ -139,3 +139,18 @@ def test_an_agent_that_pays_more_than_any_limit_is_said_not_to_meet_it():
     assert "0.3000; its limit is 0.01; multiplier 2.00" in in_training
     assert "it costs 0.3000" in tested and tested.endswith("it does not meet it.")
     assert "`slower`" in least and "0.1000" in least
+
+
+def test_an_interval_over_few_seeds_stays_inside_what_can_be():
+    rows = pd.DataFrame(
+        {
+            "train_seed": np.repeat([0, 1], 20),
+            "mean_acceleration_change": np.repeat([0.1, 3.0], 20) + np.tile([0.0, 0.01], 20),
+            "override_share": np.repeat([0.02, 0.9], 20) + np.tile([0.0, 0.01], 20),
+            "return": np.repeat([1.0, 9.0], 20),
+        }
+    )
+    change, share, earned = (agents.estimate(rows, name) for name in rows.columns[1:])
+    assert change.low == 0.0 and change.high > 3.0
+    assert (share.low, share.high) == (0.0, 1.0)
+    assert earned.low < 1.0 < 9.0 < earned.high  # a return can be anything
