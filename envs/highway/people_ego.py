@@ -12,13 +12,22 @@ from rss_shield.envs.options import Settings
 from rss_shield.envs.roads.ways import CAR_ON_ROAD
 from rss_shield.envs.worlds.walkers import RADIUS, ParkedCar, Walker, along_way
 from rss_shield.shield.definitions.occlusion import REASONABLE
+from rss_shield.shield.junctions.choice import is_trapped
 from rss_shield.shield.junctions.controller import JunctionReport
 from rss_shield.shield.junctions.memory import CROSSING
 from rss_shield.shield.junctions.plans import Scene
 from rss_shield.shield.junctions.reach import THREAT
-from rss_shield.shield.people.judge import WATCHED, Seen, judge_caution, note_exposure, remember_person, watch_person
+from rss_shield.shield.people.judge import (
+    WATCHED,
+    Seen,
+    judge_caution,
+    note_exposure,
+    remember_person,
+    stay_uncautious,
+    watch_person,
+)
 from rss_shield.shield.people.reach import PERSON, has_way, list_people, place_on_path
-from rss_shield.shield.verdicts import INHERITED, KEPT, OTHER, Verdict
+from rss_shield.shield.verdicts import INHERITED, KEPT, NO_CAUTION, OTHER, Verdict
 
 _CAR = (5.0, 2.0)  # length and width of a car that may be hidden [m]
 _AT_CROSSING = 0.5, 9.0  # who is so near to its stripes along the road, and to the middle of that, is at a crossing [m]
@@ -35,6 +44,7 @@ class PeopleEgo(JunctionEgo):
         self.shown = np.zeros(0, PERSON)  # pedestrians and ghosts of this frame
         self.extended: np.ndarray | None = None  # memory of others, and of hidden cars as if never met
         self.scratch = np.zeros((2, 0))
+        self.uncautious = False  # had no plan toward who came out, and no plan has stayed clear of everybody since
 
     # -- who is there
 
@@ -137,6 +147,11 @@ class PeopleEgo(JunctionEgo):
         result = super()._restrict(scene, acceleration, steering, holds)
         for i in appeared:
             judge_caution(remembered[i])
+            self.uncautious |= bool(remembered[i]["ego_broke"] == NO_CAUTION)
+        self.uncautious = self.uncautious and (result[0].trapped or bool(is_trapped(scene)))
+        if self.uncautious:
+            for crossing in remembered[: len(self.crossings)]:
+                stay_uncautious(crossing)
         for i, person in seen.items():
             remember_person(self.watched[i], remembered[i], person)
         self.crossings[:] = remembered[: len(self.crossings)]

@@ -123,3 +123,13 @@ def judge_caution(crossing):
     """After `judge_user` on that sample: toward who comes out reasonably the ego must have a plan (Def. 26)."""
     if crossing.age == 1 and crossing.items == 0 and crossing.other_broke == KEPT and crossing.ego_broke == KEPT:
         crossing.ego_broke, crossing.ego_excess = NO_CAUTION, 0.0
+
+
+@compiled
+def stay_uncautious(crossing):
+    """On the samples after, as long as no plan has stayed clear of everybody since: what it gets into is its own doing.
+
+    A plan toward the one who came out alone, for a moment, does not make up for it (J15).
+    """
+    if crossing.since > 0 and crossing.other_broke == KEPT and crossing.ego_broke == KEPT:
+        crossing.ego_broke, crossing.ego_excess = NO_CAUTION, 0.0

@@ -72,6 +72,21 @@ def test_a_child_that_is_expected_is_not_hit_and_one_that_is_not_expected_is():
     assert {info["blame_evidence"]["ego_duty"] for info in infos if info["blame"]} == {DUTIES[NO_CAUTION]}
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["override", "monitor"])
+def test_a_plan_for_a_moment_does_not_make_up_for_a_want_of_caution(mode):
+    """J15: a car comes out, the ego has no plan; braking it finds one toward that car alone, loses it, and is hit."""
+    env = make("occluded-intersection-v0", mode, config={"ghosts": False})
+    env.reset(seed=900196)
+    info, done = {}, False
+    while not done:
+        *_, terminated, truncated, info = env.step(2)
+        done = terminated or truncated
+    assert info["blame"] == "ego" and info["blame_evidence"]["other_duty"] == ""
+    if mode == "override":
+        assert info["blame_evidence"]["ego_duty"] == DUTIES[NO_CAUTION]
+
+
 def test_a_child_that_comes_faster_than_is_reasonable_is_to_blame():
     env = make("parked-row-v0", config=ALONE)
     infos = [with_child(env, d, 6.0, DASHES)[0] for d in np.arange(1.0, 6.0, 1.0)]

@@ -5,8 +5,26 @@ import pytest
 
 from rss_shield.shield.definitions.pedestrians import WALKS
 from rss_shield.shield.junctions.memory import CROSSING
-from rss_shield.shield.people.judge import WATCHED, Seen, judge_caution, note_exposure, remember_person, watch_person
-from rss_shield.shield.verdicts import DUTIES, HURRIED, KEPT, LEAPED, LEFT_CROSSING, NO_CAUTION, UNREASONABLE, WALKED_IN
+from rss_shield.shield.people.judge import (
+    WATCHED,
+    Seen,
+    judge_caution,
+    note_exposure,
+    remember_person,
+    stay_uncautious,
+    watch_person,
+)
+from rss_shield.shield.verdicts import (
+    DUTIES,
+    HURRIED,
+    KEPT,
+    LEAPED,
+    LEFT_CROSSING,
+    LEFT_NO_PLAN,
+    NO_CAUTION,
+    UNREASONABLE,
+    WALKED_IN,
+)
 
 WALK, DT = WALKS["paper"], 1 / 15
 STANDS = Seen(10.0, 5.0, -np.pi / 2, 0.0, 2.78, False, False, False, False, False, False)
@@ -83,3 +101,19 @@ def test_toward_who_comes_out_of_hiding_the_ego_has_a_plan(items, age, other, eg
     judge_caution(crossing)
     assert crossing["ego_broke"] == ego
     assert DUTIES[NO_CAUTION]
+
+
+@pytest.mark.parametrize(
+    ("since", "other", "before", "after"),
+    [
+        (1, KEPT, KEPT, NO_CAUTION),  # no plan toward them, and nobody else has broken anything
+        (0, KEPT, KEPT, KEPT),  # there is one
+        (3, HURRIED, KEPT, KEPT),  # they broke something
+        (3, KEPT, LEFT_NO_PLAN, LEFT_NO_PLAN),  # the ego has broken something else already
+    ],
+)
+def test_who_was_not_cautious_answers_for_what_it_gets_into(since, other, before, after):
+    crossing = np.zeros(1, CROSSING)[0]
+    crossing["since"], crossing["other_broke"], crossing["ego_broke"] = since, other, before
+    stay_uncautious(crossing)
+    assert crossing["ego_broke"] == after
