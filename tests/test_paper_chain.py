@@ -141,6 +141,11 @@ def test_a_sweep_that_is_not_finished_is_named(tmp_path):
         sweeps.write([tmp_path], tmp_path)
 
 
+def test_a_row_says_what_it_stands_for():
+    assert sweeps.played(EXPERIMENT) == "40 episodes a row"
+    assert sweeps.played(EXPERIMENT | {"seeds": [0, 1, 2]}) == "40 episodes for each of 3 seeds a row"
+
+
 def test_other_numbers_of_episodes_and_decisions():
     experiment = experiment_of({"name": "x", "policies": ["faster"]})
     assert with_budget(experiment, None) == experiment

@@ -9,6 +9,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -25,8 +26,9 @@ HEADER = """# Sweeps
 
 Written by `python -m rss_shield.eval.paper.sweeps runs/NAME ...` from runs of `rss-shield sweep`.
 
-[low, high]: 95 % intervals over episodes, of rates Clopper-Pearson's, else bootstrap; ★: on the Pareto front of its
-environment and policy, where no other row is as good in both measures and better in one. Settings are compared on the
+[low, high]: 95 % intervals over episodes, of rates Clopper-Pearson's, else bootstrap; with several seeds over seeds and
+episodes (Student's t); ★: on the Pareto front of its environment and policy, where no other row is as good in both
+measures and better in one. Settings are compared on the
 same episodes; rows whose intervals overlap may be on the front by chance."""
 
 
@@ -53,13 +55,19 @@ def section_of(folder: Path, out: Path) -> list[str]:
     return [
         f"## `{file_of(record)}`",
         experiment["about"],
-        f"{int(points['n'].max())} episodes a row" + (f"; all with {json.dumps(fixed)}." if fixed else "."),
+        played(experiment) + (f"; all with {json.dumps(fixed)}." if fixed else "."),
         "\n".join(f"- {sentence}" for sentence in sentences),
         f"![Safety and performance of {experiment['name']}]({picture.name})",
         markdown_of(texts(table, axes, shown_metrics(table, safety, performance))),
         f"```sh\nrss-shield sweep {file_of(record)}\n```",
         provenance([record]),
     ]
+
+
+def played(experiment: dict[str, Any]) -> str:
+    """How much a row of the table stands for."""
+    episodes, seeds = experiment["tests"]["episodes"], len(experiment["seeds"])
+    return f"{episodes} episodes a row" if seeds == 1 else f"{episodes} episodes for each of {seeds} seeds a row"
 
 
 def write(folders: Sequence[Path], out: Path) -> Path:
