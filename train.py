@@ -16,9 +16,9 @@ from rss_shield.eval.own import OwnFailed
 from rss_shield.eval.report import cell_path, replay_path, write_report
 from rss_shield.eval.run_folder import open_run
 from rss_shield.eval.suite.comparison.jobs import cells_of, in_engine, model_path, replaying, showing, testing, training
-from rss_shield.eval.suite.comparison.options import COMMAND
+from rss_shield.eval.suite.comparison.options import COMMAND, Config
 from rss_shield.eval.suite.comparison.reading import resolve, started
-from rss_shield.eval.suite.comparison.record import record
+from rss_shield.eval.suite.comparison.record import options_of, record
 from rss_shield.eval.suite.comparison.trying import tried
 
 PROGRAM = "train.py" if __name__ == "__main__" else COMMAND  # as it was called
@@ -32,7 +32,8 @@ def main(arguments: list[str]) -> None:
         config, folder = started(arguments, PROGRAM)
         preset = resolve(config)
         env = tried(config, preset)
-        warnings = open_run(folder, record(config, preset, env), resume=config.resume, overwrite=config.overwrite)
+        how = {"resume": config.resume, "overwrite": config.overwrite, "defaults": options_of(Config())}
+        warnings = open_run(folder, record(config, preset, env), **how)
     except (ValueError, OSError) as error:
         fail(PROGRAM, str(error))
     for warning in warnings:

@@ -6,6 +6,7 @@ import os
 import platform
 import shutil
 import subprocess
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -30,13 +31,21 @@ PACKAGES = (
 PAGES = "pages"  # folder in a run: episodes that play
 
 
-def open_run(folder: Path, config: dict[str, Any], *, resume: bool, overwrite: bool) -> list[str]:
+def open_run(
+    folder: Path,
+    config: dict[str, Any],
+    *,
+    resume: bool,
+    overwrite: bool,
+    defaults: Mapping[str, Any] = {},
+) -> list[str]:
     """Make the folder of a run, or check that the run in it may go on, and record its configuration.
 
     Args:
       config: everything that the result depends on; strict JSON apart from tuples, infinities and arrays.
       resume: go on with the run in the folder, if there is one.
       overwrite: throw the run in the folder away, if there is one.
+      defaults: of options, which a run that was started before there were these has had.
 
     Returns:
       Warnings: what has changed in packages and code since the run was started.
@@ -60,7 +69,7 @@ def open_run(folder: Path, config: dict[str, Any], *, resume: bool, overwrite: b
         return []
     before = json.loads(record.read_text(encoding="utf-8"))
     now = json.loads(to_json(provenance))
-    changed = changes(now["config"], before["config"])
+    changed = changes(now["config"], {**json.loads(to_json(dict(defaults))), **before["config"]})
     if changed:
         raise ValueError(
             f"{'; '.join(f'{field} = {new!r}, but {folder} was started with {old!r}' for field, new, old in changed)}; "

@@ -36,6 +36,14 @@ def test_a_different_configuration_is_refused_naming_the_field(tmp_path):
         open_run(tmp_path, CONFIG | {"seeds": (0,)}, resume=True, overwrite=False)
 
 
+def test_a_run_that_is_older_than_an_option_has_had_its_default(tmp_path):
+    open_run(tmp_path, CONFIG, resume=False, overwrite=False)
+    how = {"resume": True, "overwrite": False, "defaults": {"history": 1}}
+    assert open_run(tmp_path, CONFIG | {"history": 1}, **how) == []
+    with pytest.raises(ValueError, match=r"history = 2, but .* was started with 1"):
+        open_run(tmp_path, CONFIG | {"history": 2}, **how)
+
+
 def test_every_difference_is_named_however_deep(tmp_path):
     nested = CONFIG | {"ppo": {"gamma": 0.9, "net": {"pi": [64]}}}
     open_run(tmp_path, nested, resume=False, overwrite=False)
