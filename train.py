@@ -32,8 +32,13 @@ def main(arguments: list[str]) -> None:
         config, folder = started(arguments, PROGRAM)
         preset = resolve(config)
         env = tried(config, preset)
-        how = {"resume": config.resume, "overwrite": config.overwrite, "defaults": options_of(Config())}
-        warnings = open_run(folder, record(config, preset, env), **how)
+        warnings = open_run(
+            folder,
+            record(config, preset, env),
+            resume=config.resume,
+            overwrite=config.overwrite,
+            defaults=options_of(Config()),
+        )
     except (ValueError, OSError) as error:
         fail(PROGRAM, str(error))
     for warning in warnings:

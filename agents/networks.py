@@ -66,9 +66,8 @@ class Attention(Rows):
         """Features `[B, WIDTH]`."""
         rows, there = self.rows(observations)
         people = self.person(rows)
-        absent = ~there & there.any(
-            1, keepdim=True
-        )  # of an empty list all are asked: attention to nothing is no number
+        # of an empty list all are asked: attention to nothing is no number
+        absent = ~there & there.any(1, keepdim=True)
         heard, _ = self.asks(people[:, :1], people, people, key_padding_mask=absent, need_weights=False)
         return self.together(torch.cat([people[:, 0], heard[:, 0]], -1))
 

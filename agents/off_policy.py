@@ -52,8 +52,8 @@ class ExploresSingly:
     """Before a Q-learner of stable-baselines3: every environment draws for itself whether it explores.
 
     Theirs draws once for all. With `explore_for` N > 1 what was drawn is done 1 to N times in a row, each equally
-    likely, and so seldom begun that as many decisions explore: a single brake at a junction leads nowhere, four in a
-    row to another future (temporally extended exploration; Dabney, Ostrovski & Barreto, 2021).
+    likely, and so seldom begun that as many decisions explore (temporally extended exploration; Dabney, Ostrovski &
+    Barreto, 2021).
     """
 
     explore_for = 1

@@ -23,6 +23,7 @@ from typing import NamedTuple
 from rss_shield.agents.slim import write_slim
 from rss_shield.eval.arms import ARMS
 from rss_shield.eval.paper.agents import write
+from rss_shield.eval.runs.experiment import as_words, read_experiment
 from rss_shield.shield.filters.answer import FILTERS, RSS
 
 ROOT = Path(__file__).parents[1]
@@ -49,13 +50,14 @@ class Part(NamedTuple):
     options: tuple[str, ...] = ()  # further ones of train.py
 
 
-# without these no learner finds more at the intersection than to drive on, and collide in every other episode:
-# experiments/intersection.yaml
-SEEING = ("--network", "sets", "--config.observation.observe-intentions", "true")
-SEEING += ("--config.observation.features", *("presence", "x", "y", "vx", "vy", "cos_h", "sin_h", "cos_d", "sin_d"))
-SEEING += ("--hyperparameters.gamma", "0.95", "--hyperparameters.learning-rate", "0.001")
-SEEING += ("--hyperparameters.batch-size", "1024", "--hyperparameters.gradient-steps", "2")
-SEEING += ("--hyperparameters.buffer-size", "400000")
+def seeing() -> tuple[str, ...]:
+    """Options without which Q-learners find no more at the intersection than to drive on: the best of its sweep."""
+    swept = read_experiment(ROOT / "experiments" / "intersection.yaml")
+    learnt = {name: value for name, value in swept.options.items() if name.startswith("hyperparameters.")}
+    return tuple(as_words({**learnt, **swept.points["destinations, others alike"]}))
+
+
+SEEING = seeing()
 OTHERS = tuple(name for name in (*PENALTIES, *VARIANTS) if name not in MAIN)
 PARTS = (
     Part("highway-main", HIGHWAY, MAIN, 1_000_000, 10),
