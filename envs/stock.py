@@ -24,6 +24,7 @@ from rss_shield.envs.known import check_known, warn
 
 LONGEST_EPISODE = 100  # decisions, where highway-env sets no limit
 LOWEST_FREQUENCY = 5  # of simulation where roads cross [Hz]
+HIGHEST_FREQUENCY = 10_000  # of simulation [Hz]; a decision of highway-env then takes seconds
 # what `IntersectionEnv` writes into the class of its traffic, and what `IDMVehicle` is defined with
 AT_INTERSECTIONS = {"DISTANCE_WANTED": 7.0, "COMFORT_ACC_MAX": 6.0, "COMFORT_ACC_MIN": -3.0}
 ELSEWHERE = {"DISTANCE_WANTED": 10.0, "COMFORT_ACC_MAX": 3.0, "COMFORT_ACC_MIN": -5.0}
@@ -145,8 +146,8 @@ def check_frequencies(config: dict) -> None:
       ValueError: it does not, or one of the two is no frequency.
     """
     frames, decisions = config["simulation_frequency"], config["policy_frequency"]
-    if not frames > 0:
-        raise ValueError(f"simulation_frequency = {frames!r}: expected a number > 0 [Hz]")
+    if not 0 < frames <= HIGHEST_FREQUENCY:
+        raise ValueError(f"simulation_frequency = {frames!r}: expected a number > 0 and <= {HIGHEST_FREQUENCY} [Hz]")
     if not 0 < decisions <= frames:
         raise ValueError(
             f"policy_frequency = {decisions!r} with simulation_frequency = {frames!r}: "

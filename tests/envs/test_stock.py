@@ -180,7 +180,8 @@ def test_a_duration_given_at_reset_counts():
 
 
 @pytest.mark.parametrize(
-    ("simulation", "policy"), [(15, 30), (5, 6), (10, 10.5), (0.25, 0.5), (15, 0), (15, -1), (0, 0), (15, float("nan"))]
+    ("simulation", "policy"),
+    [(15, 30), (5, 6), (10, 10.5), (0.25, 0.5), (15, 0), (15, -1), (0, 0), (15, float("nan")), (1e9, 1)],
 )
 def test_more_decisions_than_frames_are_refused_wherever_they_enter(simulation, policy):
     bad = {"simulation_frequency": simulation, "policy_frequency": policy}

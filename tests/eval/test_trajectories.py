@@ -197,6 +197,8 @@ def refused(capsys, *arguments):
         ("--units kind=m", "unit of kind = 'm': expected none, but of t, heading"),
         ("--units x=ft,x=m", "--units x=ft,x=m: x is there 2 times: expected once"),
         ("--columns x=east,y=north,x=px", "x is there 2 times: expected once"),
+        ("--columns x=id", "--columns x=id: column id would be id and x: expected one for each"),
+        ("--columns x=px,speed=px", "column px would be x and speed"),
         ("--response-time -1", "--response-time -1: expected a number > 0 and <= 60"),
         ("--preset carlo", "preset = 'carlo': expected one of"),
     ],

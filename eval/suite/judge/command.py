@@ -16,6 +16,7 @@ from rss_shield.eval.suite.own_table import KNOWN_PRESETS, preset_in
 from rss_shield.shield.params import Preset
 from rss_shield.shield.trace import Lane, Trace, load
 
+FIELDS = 10  # of `Format` that name columns
 # options that say what is in a CSV file, and what they are where they are not given
 _OF_CSV = {"format": "plain", "columns": "", "units": "", "y": None, "point": None, "dt": None, "lanes": None} | {
     "lanes_at": "",
@@ -153,13 +154,31 @@ def _format(options: argparse.Namespace) -> Format:
     units = _pairs("--units", options.units)
     for option, pairs in (("--columns", names), ("--units", units)):
         for name in pairs:
-            if name not in Format._fields[:10]:
-                raise ValueError(f"{option} {name}=...: expected one of {', '.join(Format._fields[:10])}")
+            if name not in Format._fields[:FIELDS]:
+                raise ValueError(f"{option} {name}=...: expected one of {', '.join(Format._fields[:FIELDS])}")
     known = known._replace(**names, units={**known.units, **units})
+    _check_apart(known, options.columns)
     check_units(known.units, known.frame_rate)
     if options.y:
         known = known._replace(y_up=options.y == "up")
     return known._replace(point=options.point) if options.point else known
+
+
+def _check_apart(known: Format, text: str) -> None:
+    """Does every column say one thing? Only a length and a width may be the same number.
+
+    Raises:
+      ValueError: one of them is to be two fields.
+    """
+    fields: dict[str, str] = {}
+    for field in known._fields[:FIELDS]:
+        column = getattr(known, field)
+        if column in fields and {field, fields[column]} != {"length", "width"}:
+            raise ValueError(
+                f"--columns {text}: column {column} would be {fields[column]} and {field}: expected one for each"
+            )
+        if column:
+            fields[column] = field
 
 
 def _pairs(option: str, text: str) -> dict[str, str]:
