@@ -4,7 +4,7 @@
     python bench/campaign.py --list          what it consists of, and what is done
     python bench/campaign.py --plan short    the most telling arms with fewer seeds and decisions (two hours on 2 cores)
     python bench/campaign.py --write         docs/results/agents.md from what is done; with --list nothing is trained
-    python bench/campaign.py --ship          models/ENVIRONMENT/ARM from the first seeds of what is done, made small
+    python bench/campaign.py --ship          models/ENVIRONMENT/ARM: those of the first seed, made small and tested
     python bench/campaign.py --divide 1000 -- --n-envs 2 --replay-episodes 0     try the whole chain
     python bench/campaign.py -- --workers 1  further options of train.py
 
@@ -14,14 +14,20 @@ the 13 s of their training, and the frontier of each road is drawn from all of i
 """
 
 import argparse
+import json
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
+
+import pandas as pd
 
 from rss_shield.agents.slim import write_slim
 from rss_shield.eval.arms import ARMS
+from rss_shield.eval.cards import write_card
+from rss_shield.eval.files import atomic
 from rss_shield.eval.paper.agents import write
 from rss_shield.eval.runs.experiment import as_words, read_experiment
 from rss_shield.shield.filters.answer import FILTERS, RSS
@@ -158,12 +164,21 @@ def main() -> None:
 
 
 def ship(part: Part, runs: Path, to: Path) -> None:
-    """Copy the models of a part's first seed, without what only training needs, and their cards."""
-    for model in sorted(folder_of(part, runs).glob("*-seed0/model.zip")):
-        folder = to / part.env_id / model.parent.name.removesuffix("-seed0")
-        write_slim(model, folder / "model.zip")
-        for card in ("card.json", "card.md"):
-            shutil.copyfile(model.parent / card, folder / card)
+    """The models of a part's first seed, made small, and their cards with what the small ones do in tests."""
+    run = folder_of(part, runs)
+    record = json.loads((run / "config.json").read_text(encoding="utf-8"))
+    trained = ((arm, run / f"{arm}-seed0" / "model.zip") for arm in part.arms)
+    for arm, model in ((arm, model) for arm, model in trained if model.exists()):
+        folder = to / part.env_id / arm
+        folder.mkdir(parents=True, exist_ok=True)
+        with atomic(folder / "model.zip") as small:
+            write_slim(model, small)
+        shutil.copyfile(model.parent / "card.json", folder / "card.json")
+        with TemporaryDirectory() as out:
+            seeds, tests = record["config"]["test_seeds"], ARMS[arm].tests
+            options = ["--first-seed", str(seeds["first"]), "--episodes", str(seeds["last"] - seeds["first"] + 1)]
+            call(["-m", "rss_shield.test", str(folder / "model.zip"), *options, "--tests", *tests, "--out", out])
+            write_card(folder, arm, 0, record, pd.read_csv(Path(out) / "episodes.csv"))
         print(f"written: {folder}")
 
 

@@ -1,5 +1,6 @@
-"""The campaign: killed in the midst and begun again, nothing is lost and nothing done twice."""
+"""The campaign: killed in the midst and begun again, nothing is lost and nothing done twice; what is shipped of it."""
 
+import json
 import os
 import signal
 import subprocess
@@ -8,7 +9,7 @@ import time
 
 from places import ROOT
 
-from bench.campaign import PARTS, SCRIPTED
+from bench.campaign import PARTS, SCRIPTED, ship
 from rss_shield.eval.arms import ARMS
 
 COMMAND = [sys.executable, str(ROOT / "bench" / "campaign.py"), "--parts", "highway-main", "--divide", "10000"]
@@ -46,3 +47,10 @@ def test_a_killed_campaign_goes_on_where_it_was(tmp_path):
     assert (folder / "results.json").stat().st_mtime_ns == results
     listed = subprocess.run([*COMMAND, "--runs-dir", str(tmp_path), "--list"], cwd=ROOT, capture_output=True, text=True)
     assert listed.stdout.startswith("highway-main: done; 1000000 decisions, 10 seeds, unshielded, shielded,")
+    ship(PARTS[0]._replace(arms=("maskable",)), tmp_path, tmp_path / "models")
+    shipped, whole = tmp_path / "models" / "highway-fast-v0" / "maskable", folder / "maskable-seed0"
+    assert (shipped / "model.zip").stat().st_size < 0.35 * (whole / "model.zip").stat().st_size
+    cards = [json.loads((where / "card.json").read_text()) for where in (shipped, whole)]
+    assert cards[0].pop("results").keys() == cards[1].pop("results").keys()  # tested anew
+    assert cards[0] == cards[1]
+    assert "# maskable, seed 0" in (shipped / "card.md").read_text()
