@@ -20,7 +20,7 @@ COLUMNS = (
     "timesteps",  # decisions of all environments together when the episode ended or was cut off
     "started",  # ... and when it began
     "cut",  # 1: the block of training ended first; what the row says is how far the episode got
-    "return",  # sum of rewards
+    "return",  # sum of the environment's rewards, or of one's own; what a learner is charged is not in it
     "length",  # decisions
     "crashed",  # 1: the car touched somebody
     "blame",  # who broke their duty: ego, both, other, inherited, none, or NO_CONTACT
@@ -52,8 +52,9 @@ class CurveRecorder(BaseCallback):
         self.lengths = np.zeros(self.training_env.num_envs, int)
 
     def _on_step(self) -> bool:
-        n_envs, rewards, dones = self.training_env.num_envs, self.locals["rewards"], self.locals["dones"]
-        self.returns += rewards
+        env: Any = self.training_env
+        n_envs, rewards, dones = env.num_envs, self.locals["rewards"], self.locals["dones"]
+        self.returns += env.earned
         self.lengths += 1
         infos = self.locals["infos"]
         ended = [episode_row(self.num_timesteps, n_envs, infos[e]) for e in np.flatnonzero(dones).tolist()]

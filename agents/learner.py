@@ -48,7 +48,11 @@ RANGES: dict[str, tuple[float, float, bool]] = {
     "gradient_steps": (1, math.inf, _WHOLE),
     "tau": (_OPEN, 1, not _WHOLE),
     "target_update_interval": (1, math.inf, _WHOLE),
+    "exploration_fraction": (_OPEN, 1, not _WHOLE),
+    "exploration_initial_eps": (0, 1, not _WHOLE),
+    "exploration_final_eps": (0, 1, not _WHOLE),
 }
+KWARGS = "policy_kwargs"
 _BLOCKS_DEPEND_ON = ("policy", "n_steps", "train_freq")
 _NO_HYPERPARAMETERS = ("seed", "device", "tensorboard_log", "verbose", "stats_window_size", "_init_setup_model")
 
@@ -89,7 +93,7 @@ class Learner(NamedTuple):
                 expected = ", ".join(sorted(known))
                 raise ValueError(f"hyperparameters.{name}: {self.algorithm.__name__} takes {expected}")
             check_hyperparameter(name, value)
-        return self._replace(options=lambda n_envs, total: {**self.options(n_envs, total), **changes})
+        return self._replace(options=lambda n_envs, total: _changed(self.options(n_envs, total), changes))
 
     def with_network(self, name: str) -> "Learner":
         """This learner with a network of `agents.networks` in front of its own layers."""
@@ -97,11 +101,7 @@ class Learner(NamedTuple):
         if not more:
             return self
 
-        def options(n_envs: int, total: int) -> dict[str, Any]:
-            given = self.options(n_envs, total)
-            return {**given, "policy_kwargs": {**given.get("policy_kwargs", {}), **more}}
-
-        return self._replace(options=options)
+        return self._replace(options=lambda n_envs, total: _changed(self.options(n_envs, total), {KWARGS: more}))
 
     def defaults(self) -> dict[str, Any]:
         """The arguments of the algorithm that have a value of their own."""
@@ -125,6 +125,12 @@ class Learner(NamedTuple):
             "rollouts_per_block": self.rollouts_per_block(n_envs),
             "timesteps": self.rounded(n_envs, total_timesteps),
         }
+
+
+def _changed(options: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Options with other values; of the policy's arguments those that are not named stay."""
+    merged = {KWARGS: {**(options.get(KWARGS) or {}), **(changes[KWARGS] or {})}} if KWARGS in changes else {}
+    return {**options, **changes, **merged}
 
 
 def _as_words(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,8 +15,8 @@ BUFFER = 100_000  # decisions
 BATCH = 128
 DECISIONS_PER_UPDATE = 8
 GAMMA = 0.9
-# of the exploration of Q-learners
-EPSILON, LEAST_EPSILON, EXPLORES = 1.0, 0.05, 0.3  # at first, in the end, and after which share of the decisions
+# of Q-learners: share of random decisions at first and in the end, and after which part of the training that is
+EXPLORATION = {"exploration_initial_eps": 1.0, "exploration_final_eps": 0.05, "exploration_fraction": 0.3}
 
 
 def rollout(n_envs: int, total_timesteps: int) -> int:
@@ -42,8 +42,9 @@ def options(n_envs: int, total_timesteps: int) -> dict[str, Any]:
 
 def explore_less(model: Any, total_timesteps: int) -> None:
     """The share of random actions in the next block."""
-    done = min(model.num_timesteps / (EXPLORES * total_timesteps), 1.0)
-    model.exploration_schedule = FloatSchedule(EPSILON + done * (LEAST_EPSILON - EPSILON))
+    done = min(model.num_timesteps / (model.exploration_fraction * total_timesteps), 1.0)
+    first, last = model.exploration_initial_eps, model.exploration_final_eps
+    model.exploration_schedule = FloatSchedule(first + done * (last - first))
     model.exploration_rate = model.exploration_schedule(1.0)
     model.forget_exploration()
 
@@ -59,6 +60,7 @@ class ExploresSingly:
     explore_for = 1
     exploration_rate: float
     action_space: Any
+    env: Any
     _left: np.ndarray | None = None  # how often each environment repeats what it drew
 
     def forget_exploration(self) -> None:
@@ -75,6 +77,9 @@ class ExploresSingly:
         count = len(actions)  # torch's generator is seeded by `set_random_seed`
         if self._left is None or len(self._left) != count:
             self._left, self._drawn = np.zeros((2, count), int)
+        ended = getattr(self.env, "ended", None)
+        if ended is not None and len(ended) == count:
+            self._left[ended] = 0  # another episode has begun
         explores = torch.rand(count).numpy() < begin_rate(self.exploration_rate, self.explore_for)
         drawn = torch.randint(int(self.action_space.n), (count,)).numpy()
         begins = explores & (self._left == 0)

@@ -44,6 +44,7 @@ class VectorEnvAdapter(VecEnv):
         # takes the place of the environment's rewards, before anything is charged; an episode's return is their sum
         self.reward: Reward | None = None
         self.last_infos: dict = {}
+        self.earned = np.zeros(env.num_envs)  # by the last step, before anything is charged
         self.ended = np.zeros(env.num_envs, bool)  # by the last step
         self.truncated = np.zeros(env.num_envs, bool)
         self._seed: int | None = None
@@ -74,6 +75,7 @@ class VectorEnvAdapter(VecEnv):
         if self.reward is not None:
             rewards = rewards_by(self.reward, rewards, self._actions, infos, self.ended)
             self._sums += rewards
+        self.earned = np.asarray(rewards, float)
         nothing: dict = {}
         list_of_infos = [nothing] * self.num_envs
         for e in np.flatnonzero(self.ended).tolist():

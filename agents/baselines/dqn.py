@@ -22,7 +22,7 @@ def learner(explore_for: int = 1) -> Learner:
 
 def learner_with(algorithm: type, given: Any, explore_for: int = 1) -> Learner:
     """A Q-learner with a replay buffer."""
-    lasts = f", each for 1 to {explore_for} decisions" if explore_for > 1 else ""
+    lasts = f", for 1 to {explore_for} decisions" if explore_for > 1 else ""
     return Learner(
         algorithm,
         given,
@@ -31,8 +31,7 @@ def learner_with(algorithm: type, given: Any, explore_for: int = 1) -> Learner:
         begin_block=off_policy.explore_less,
         attributes=lambda: {"explore_for": explore_for},
         notes={
-            "exploration": f"{off_policy.EPSILON:g} to {off_policy.LEAST_EPSILON:g} over {off_policy.EXPLORES:.0%} of "
-            f"the decisions, block by block, drawn in every environment{lasts}"
+            "exploration": f"its share falls block by block, and every environment draws for itself{lasts}",
         },
     )
 
@@ -40,6 +39,7 @@ def learner_with(algorithm: type, given: Any, explore_for: int = 1) -> Learner:
 def options(n_envs: int, total_timesteps: int) -> dict[str, Any]:
     return {
         **off_policy.options(n_envs, total_timesteps),
+        **off_policy.EXPLORATION,
         "policy_kwargs": {"net_arch": [128, 128]},
         "learning_rate": LEARNING_RATE,
         "target_update_interval": max(TARGET_UPDATES, n_envs),

@@ -53,8 +53,10 @@ class EndsAtIntervention(VectorEnvAdapter):
         intervened = np.asarray(self.told("shield", "override_fraction")) > 0.0
         intervened |= np.asarray(self.told("shield", "mean_acceleration_change")) > CHANGE
         rewards -= np.float32(self.penalty) * intervened
-        self.returns += rewards
+        self.returns += self.earned
         self.lengths += 1
+        for e in np.flatnonzero(intervened & ended).tolist():
+            list_of_infos[e]["TimeLimit.truncated"] = False  # nothing is hoped for after an intervention
         stopped = intervened & ~ended
         if stopped.any():
             observations = observations.copy()
@@ -68,6 +70,7 @@ class EndsAtIntervention(VectorEnvAdapter):
                 }
             begun, _ = self.env.reset(options={"reset_mask": stopped})
             observations[stopped] = begun[stopped]
+            self._sums[stopped] = 0.0
         over = ended | stopped
         self.truncated = self.truncated & ~intervened
         self.returns[over], self.lengths[over] = 0.0, 0

@@ -198,6 +198,17 @@ def test_shaping_charges_each_new_closest_approach_once_and_a_contact():
     np.testing.assert_allclose(shaping(Told([False, False], min_ttc=[3.0, 9.0], blame=["", ""])), [0.5, 0.0])
 
 
+def test_returns_of_the_learning_curve_are_the_environments_whatever_is_charged(tmp_path):
+    """1000 for a contact, and no row shows it: neither whole episodes, nor those that the end of a block cuts off."""
+    learner = learner_of("shaped-ppo", crash=1000.0, short=500.0)
+    train_in_blocks(learner, environments({"shield": "monitor"}), tmp_path, seed=0, total_timesteps=1024, n_envs=8)
+    with open(tmp_path / "learning_curve.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["cut"] for row in rows} == {"0", "1"}
+    assert any(row["crashed"] == "1" for row in rows)
+    assert all(0.0 <= float(row["return"]) <= int(row["length"]) for row in rows)  # rewards are from 0 to 1
+
+
 def test_an_intervention_ends_the_episode_and_costs():
     env = EndsAtIntervention(rss_shield.make_vec(ENV, 32, "override"), penalty=2.0)
     free = VectorEnvAdapter(rss_shield.make_vec(ENV, 32, "override"))
@@ -220,6 +231,39 @@ def test_an_intervention_ends_the_episode_and_costs():
             stopped += 1
         going &= ~ended
     assert stopped > 3
+
+
+def test_nothing_is_hoped_for_after_an_intervention_in_the_last_decision():
+    """The time runs out, and the shield intervenes in that very decision: PPO must not add a value of the future."""
+    env = EndsAtIntervention(rss_shield.make_vec(ENV, 32, "override", config={"duration": 4}), penalty=1.0)
+    env.seed(0)
+    env.reset()
+    at_the_end = 0
+    for _ in range(40):
+        actions = np.where(env.lengths >= 3, FASTER, 4)  # 4: SLOWER
+        *_, infos = env.step(actions)
+        change = env.told("shield", "mean_acceleration_change")
+        intervened = (env.told("shield", "override_fraction") > 0) | (change > CHANGE)
+        for e in np.flatnonzero(env.ended):
+            assert infos[e]["TimeLimit.truncated"] == (env.truncated[e] and not intervened[e])
+            at_the_end += int(intervened[e])
+    assert at_the_end > 10
+
+
+def test_returns_of_episodes_that_an_intervention_ends_are_of_that_episode_alone():
+    """With a reward of 1 a decision, and the penalty left out, a return is a length."""
+    env = EndsAtIntervention(rss_shield.make_vec(ENV, 16, "override", config={"duration": 10}), penalty=2.0)
+    env.reward = lambda decision: np.ones(len(decision.reward))
+    env.seed(0)
+    env.reset()
+    rng = np.random.default_rng(0)
+    stopped = finished = 0
+    for _ in range(100):
+        *_, over, infos = env.step(np.where(rng.random(16) < 0.1, FASTER, 4))
+        for e in np.flatnonzero(over):
+            assert infos[e]["episode"]["r"] == infos[e]["episode"]["l"]
+            stopped, finished = stopped + int(not env.ended[e]), finished + int(env.ended[e])
+    assert stopped > 10 and finished > 10
 
 
 def test_costs_are_followed_to_the_end_of_an_episode():
@@ -315,7 +359,7 @@ def test_exploration_lasts_as_long_as_asked_and_is_as_frequent(longest, share):
             return np.full(len(observation), -1), state
 
     class Explorer(off_policy.ExploresSingly, Greedy):
-        explore_for, exploration_rate = longest, share
+        explore_for, exploration_rate, env = longest, share, None
         action_space = SimpleNamespace(n=10**6)  # nothing is drawn twice
 
     torch.manual_seed(0)
@@ -326,8 +370,10 @@ def test_exploration_lasts_as_long_as_asked_and_is_as_frequent(longest, share):
     lengths = [length for drawn, length in runs if drawn >= 0]
     assert max(lengths) == longest
     assert np.mean(lengths) == pytest.approx((1 + longest) / 2, rel=0.05)
-    explorer.forget_exploration()
     explorer.exploration_rate = 0.0
+    explorer.env = SimpleNamespace(ended=np.arange(500) < 250)
+    assert (explorer.predict(np.zeros((500, 1)))[0][:250] == -1).all()  # an episode begins without what was begun
+    explorer.forget_exploration()
     assert (explorer.predict(np.zeros((500, 1)))[0] == -1).all()
 
 

@@ -52,3 +52,25 @@ def test_a_learning_rate_falls_from_the_one_given_to_nothing():
     model.num_timesteps = 100
     ppo.lower_learning_rate(model, 100)
     assert model.lr_schedule(1.0) == 0.0
+
+
+@pytest.mark.parametrize("name", ["dqn", "qr-dqn", "executed-dqn", "semantic-dqn"])
+def test_exploration_falls_as_it_is_told_to_and_as_the_record_says(name):
+    told = {"exploration_initial_eps": 0.6, "exploration_final_eps": 0.2, "exploration_fraction": 0.5}
+    learner = learner_of(name).with_hyperparameters(told)
+    record = learner.hyperparameters(8, 1000)
+    assert {key: record[key] for key in told} == told
+    options = learner.options(8, 1000)
+    model = SimpleNamespace(forget_exploration=lambda: None, **{key: options[key] for key in told})
+    rates = []
+    for model.num_timesteps in (0, 250, 500, 900):
+        learner.begin_block(model, 1000)
+        rates.append(model.exploration_rate)
+    assert rates == pytest.approx([0.6, 0.4, 0.2, 0.2])
+
+
+def test_arguments_of_the_policy_that_are_not_named_stay():
+    learner = learner_of("qr-dqn").with_hyperparameters({"policy_kwargs": {"net_arch": [64]}})
+    kwargs = learner.options(8, 1000)["policy_kwargs"]
+    assert kwargs == {**learner_of("qr-dqn").options(8, 1000)["policy_kwargs"], "net_arch": [64]}
+    assert "n_quantiles" in kwargs
