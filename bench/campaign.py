@@ -5,7 +5,7 @@
     python bench/campaign.py --plan short    the most telling arms with fewer seeds and decisions (two hours on 2 cores)
     python bench/campaign.py --write         docs/results/agents.md from what is done; with --list nothing is trained
     python bench/campaign.py --ship          models/ENVIRONMENT/ARM: those of the first seed, made small and tested
-    python bench/campaign.py --divide 1000 -- --n-envs 2 --replay-episodes 0     try the whole chain
+    python bench/campaign.py --divide 1000 --runs-dir trial -- --n-envs 2 --replay-episodes 0    try the whole chain
     python bench/campaign.py -- --workers 1  further options of train.py
 
 Each part is a run of train.py, in `runs/campaign-PART`. Kill it whenever you like; a model, a test or a replay that is
@@ -20,7 +20,7 @@ import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -95,17 +95,30 @@ def folder_of(part: Part, runs: Path) -> Path:
     return runs / f"campaign-{part.name}"
 
 
-def is_done(part: Part, runs: Path) -> bool:
-    return (folder_of(part, runs) / "results.json").exists()
+def size_of(part: Part, divide: int) -> dict[str, Any]:
+    """What is asked for, by train.py's names."""
+    return {
+        "arms": list(part.arms),
+        "seeds": list(range(part.seeds if divide == 1 else 1)),
+        "total_timesteps": max(part.decisions // divide, 1),
+        "eval_episodes": max(part.episodes // divide, 1),
+    }
+
+
+def is_done(part: Part, runs: Path, divide: int = 1) -> bool:
+    """Is all of it there? What a trial or an earlier plan left is another run."""
+    folder = folder_of(part, runs)
+    if not (folder / "results.json").exists():
+        return False
+    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
+    return all(config[name] == value for name, value in size_of(part, divide).items())
 
 
 def train(part: Part, runs: Path, divide: int, more: list[str]) -> None:
     """Begin a part, or go on with it."""
-    folder = folder_of(part, runs)
-    seeds = range(part.seeds if divide == 1 else 1)
-    options = ["--env-id", part.env_id, "--arms", *part.arms, "--seeds", *map(str, seeds)]
-    options += ["--total-timesteps", str(max(part.decisions // divide, 1))]
-    options += ["--eval-episodes", str(max(part.episodes // divide, 1))]
+    folder, size = folder_of(part, runs), size_of(part, divide)
+    options = ["--env-id", part.env_id, "--arms", *size["arms"], "--seeds", *map(str, size["seeds"])]
+    options += ["--total-timesteps", str(size["total_timesteps"]), "--eval-episodes", str(size["eval_episodes"])]
     options += ["--runs-dir", str(runs), "--name", folder.name, "--resume-or-start", *part.options, *more]
     call([str(ROOT / "train.py"), *options])
 
@@ -152,12 +165,15 @@ def main() -> None:
     chosen = [part for part in plan.values() if arguments.parts is None or part.name in arguments.parts]
     if arguments.list or arguments.ship:
         for part in chosen:
-            done = "done" if is_done(part, runs) else "to do"
-            print(f"{part.name}: {done}; {part.decisions} decisions, {part.seeds} seeds, {', '.join(part.arms)}")
+            state = "done" if is_done(part, runs, arguments.divide) else "to do"
+            print(f"{part.name}: {state}; {part.decisions} decisions, {part.seeds} seeds, {', '.join(part.arms)}")
     else:
         play(chosen, runs, arguments)
     if arguments.write:
-        print(f"written: {write([folder_of(part, runs) for part in chosen], arguments.out)}")
+        done = [folder_of(part, runs) for part in chosen if is_done(part, runs, arguments.divide)]
+        if not done:
+            parser.error(f"--write: nothing is done in {runs} of {', '.join(part.name for part in chosen)}")
+        print(f"written: {write(done, arguments.out)}")
     if arguments.ship:
         for part in chosen:
             ship(part, runs, ROOT / "models")
@@ -185,7 +201,7 @@ def ship(part: Part, runs: Path, to: Path) -> None:
 def play(chosen: list[Part], runs: Path, arguments: argparse.Namespace) -> None:
     """Begin some parts, or go on with them."""
     for part in chosen:
-        if not is_done(part, runs):
+        if not is_done(part, runs, arguments.divide):
             train(part, runs, arguments.divide, arguments.more)
         if part.env_id == INTERSECTION:
             test_long(part, runs, arguments.divide)

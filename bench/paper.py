@@ -3,7 +3,7 @@
     python bench/paper.py                       begin, or go on: what is finished is not repeated
     python bench/paper.py --list                the commands, one a line
     python bench/paper.py --plan full           the whole campaign (days), not the short one (hours)
-    python bench/paper.py --divide 1000 --out paper-runs/pages --runs-dir paper-runs     try the whole chain (minutes)
+    python bench/paper.py --divide 1000         try the whole chain (minutes), in RUNS/divided-1000
 
 Runs are in `--runs-dir`, pages and figures in `--out`, the report of all of it in RUNS/report; how long each command
 took is in RUNS/paper-times.csv. Decisions and episodes are divided by `--divide`, seeds then are one or two.
@@ -124,8 +124,10 @@ def main() -> None:
     if arguments.divide < 1:
         parser.error(f"--divide {arguments.divide}: expected at least 1")
     arguments.runs_dir = arguments.runs_dir.resolve()
+    if arguments.divide > 1:  # a trial overwrites no results, and is never taken for any
+        arguments.runs_dir /= f"divided-{arguments.divide}"
     default = ROOT / "docs" / "results" if arguments.divide == 1 else arguments.runs_dir / "pages"
-    arguments.out = (arguments.out or default).resolve()  # a trial never overwrites results
+    arguments.out = (arguments.out or default).resolve()
     for step in steps_of(arguments):
         if arguments.list:
             print(as_typed(step))

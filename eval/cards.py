@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from rss_shield.envs.arguments import plain
 from rss_shield.eval.arms import arm_named
 from rss_shield.eval.files import write_json, write_text
 from rss_shield.eval.metrics import METRICS, Metric, with_outcomes
 from rss_shield.eval.pages import markdown
 from rss_shield.eval.stats import Interval, student, wilson
+from rss_shield.eval.suite.comparison.making import changed_options
 from rss_shield.eval.table import rounded
 
 ON_CARD = (
@@ -48,6 +50,7 @@ def card_of(arm: str, seed: int, run: dict[str, Any], episodes: pd.DataFrame) ->
         **{name: config[name] for name in SETTING},
         "history": config.get("history", 1),
         "config": {**config["config"], **row.config},
+        "options": plain(changed_options(config)),
         "training": {
             **{name: config[name] for name in TRAINING},
             **({"reward": config["reward"]} if config.get("reward") else {}),
@@ -96,6 +99,7 @@ def as_text(card: dict[str, Any]) -> str:
             f"{_paid(training)}"
             f"RSS preset {card['preset']}; entry {card['entry']}, intent {card['intent']}, waiting {card['waiting']}.",
             f"Configuration that differs from the environment's: {card['config'] or 'none'}."
+            + (f" Options of the shield that are not its defaults: {card['options']}." if card["options"] else "")
             + (f" It sees the last {card['history']} observations, `[H, ...]`." if card["history"] > 1 else ""),
             "",
             f"{n} test episodes a column, seeds {seeds['first']} to {seeds['last']}, greedy; [95 % interval]: Wilson's "

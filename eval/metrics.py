@@ -71,6 +71,9 @@ METRICS = (
 )
 
 
+RATES = frozenset(metric.name for metric in METRICS if metric.statistic == "rate")
+
+
 def with_outcomes(episodes: pd.DataFrame) -> pd.DataFrame:
     """Add one 0/1 column per outcome: crash = at_fault + other + inherited + none.
 
@@ -144,8 +147,22 @@ def over_seeds(values: np.ndarray, over_episodes: Interval, limits: tuple[float,
     return {"seed_low": float(max(low, limits[0])), "seed_high": float(min(high, limits[1])), "seeds": spread.n}
 
 
+def paired(cell: pd.DataFrame, first: pd.DataFrame, suffix: str) -> pd.DataFrame:
+    """Two cells side by side, by training seed and episode seed; columns of the second end in `suffix`.
+
+    Who learns nothing is tested once, and is beside every training seed of the other.
+    """
+    keys = ["train_seed", "seed"]
+    seeds, others = set(cell["train_seed"]), set(first["train_seed"])
+    if seeds != others and len(others) == 1:
+        keys, first = ["seed"], first.drop(columns="train_seed")
+    elif seeds != others and len(seeds) == 1:
+        keys, cell = ["seed"], cell.drop(columns="train_seed")
+    return cell.merge(first, on=keys, suffixes=("", suffix))
+
+
 def differences(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Every cell minus the first one, paired by training seed and episode seed; means of all metrics.
+    """Every cell minus the first one; see `paired`. Means of all metrics.
 
     A pair counts where both of its episodes have the metric: times to the goal only where both reach it.
 
@@ -153,11 +170,10 @@ def differences(episodes: pd.DataFrame) -> pd.DataFrame:
       Columns train, test, metric, value, low, high, n, seed_low, seed_high, seeds, as in `summarise`.
     """
     rng = np.random.default_rng(0)
-    keys = ["train_seed", "seed"]
     cells = list(with_outcomes(episodes).groupby(["train", "test"], sort=False))
     rows = []
     for (train, test), cell in cells[1:]:
-        pairs = cell.merge(cells[0][1], on=keys, suffixes=("", "_baseline"))
+        pairs = paired(cell, cells[0][1], "_baseline")
         for metric in metrics_in(cell.columns):
             sample = pairs[metric.name].to_numpy(float)
             baseline = pairs[f"{metric.name}_baseline"].to_numpy(float)

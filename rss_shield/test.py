@@ -121,6 +121,8 @@ def main(arguments: list[str]) -> None:
     except (ValueError, OSError, ImportError) as error:
         fail(PROGRAM, f"{type(error).__name__}: {error}" if isinstance(error, ImportError) else str(error))
     played = []
+    if card.get("options"):
+        print(f"As on the card of the model: {json.dumps(card['options'])}", file=sys.stderr)
     for test, shield in tests.items():
         try:
             played.append(play(config, params, policy, card, test, shield))
@@ -179,12 +181,12 @@ def completed(config: Config, values: dict[tuple[str, ...], Any], card: Mapping[
 
 
 def tests_of(config: Config, card: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Name of each test -> options of the shield."""
+    """Name of each test -> options of the shield: those that a model was trained behind, and the test's own."""
     known = {**OFF_AND_ON, **card.get("tests", {})}
     unknown = [test for test in config.tests if test not in known]
     if unknown or not config.tests:
         raise ValueError(f"--tests {shown(config.tests)} is out of range: expected some of {', '.join(known)}")
-    return {test: known[test] for test in config.tests}
+    return {test: {**card.get("options", {}), **known[test]} for test in config.tests}
 
 
 def preset_of(config: Config, card: Mapping[str, Any]) -> Preset | None:
@@ -257,8 +259,7 @@ def environments(config: Config, params: Any, shield: Mapping[str, Any], n_envs:
         params=params,
         config=config.config or None,
         autoreset_mode=AutoresetMode.DISABLED,
-        **conduct,
-        **shield,
+        **{**conduct, **shield},
     )
     return with_history(env, config.history)
 

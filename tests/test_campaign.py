@@ -46,6 +46,11 @@ def test_a_killed_campaign_goes_on_where_it_was(tmp_path):
     assert "train.py" not in again.stdout  # nothing is left to do but the figure
     assert (folder / "results.json").stat().st_mtime_ns == results
     listed = subprocess.run([*COMMAND, "--runs-dir", str(tmp_path), "--list"], cwd=ROOT, capture_output=True, text=True)
+    listed_whole = [word for word in COMMAND if word not in ("--divide", "10000")]
+    whole = subprocess.run(
+        [*listed_whole, "--runs-dir", str(tmp_path), "--list"], cwd=ROOT, capture_output=True, text=True
+    )
+    assert whole.stdout.startswith("highway-main: to do;")  # a trial is not the real thing
     assert listed.stdout.startswith("highway-main: done; 1000000 decisions, 10 seeds, unshielded, shielded,")
     ship(PARTS[0]._replace(arms=("maskable",)), tmp_path, tmp_path / "models")
     shipped, whole = tmp_path / "models" / "highway-fast-v0" / "maskable", folder / "maskable-seed0"

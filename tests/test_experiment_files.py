@@ -28,7 +28,8 @@ def test_an_experiment_is_one_training_run_per_road(file):
     first, second = expanded("train", [file, "--workers", "1"])
     assert " ".join(first) == (
         "--name two-roads-highway-fast-v0 --resume-or-start --env-id highway-fast-v0 --arms shielded lazy --seeds 0 3 "
-        "--eval-episodes 40 --total-timesteps 500 --risk --rules.memory False --config.lanes-count 2 --workers 1"
+        "--eval-episodes 40 --first-seed 1000000000 --total-timesteps 500 --risk --rules.memory False "
+        "--config.lanes-count 2 --workers 1"
     )
     assert second[:5] == ["--name", "two-roads-merge-v0", "--resume-or-start", "--env-id", "merge-v0"]
     config, folder = started(first)
@@ -66,7 +67,7 @@ def test_other_command_lines_are_themselves(file):
     [
         ("train", "policies: [random]", "has policies: rss-shield sweep"),
         ("train", "arms: [shielded]\nsweep: {grid: {entry: [cautious]}}", "has a sweep: rss-shield sweep"),
-        ("train", "arms: [shielded]\ntests: {first_seed: 5}", "first_seed = 5: expected 1000000000"),
+        ("train", "arms: [shielded]\ntests: {first_seed: 5}", "--first-seed 5 is out of range: expected 1000000000 to"),
         ("train", "arms: [shielded]\nsedes: [1]", "the nearest is 'seeds'"),
         ("report", "arms: [shielded]", "nothing in"),
     ],

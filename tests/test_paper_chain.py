@@ -73,10 +73,12 @@ def test_a_divided_trial_has_little_of_everything_and_seeds_of_its_own():
 
 
 def test_a_trial_never_overwrites_results(tmp_path, monkeypatch, capsys):
-    for divide, folder in (("1", paper.ROOT / "docs" / "results"), ("10", tmp_path / "pages")):
+    for divide, folder in (("1", paper.ROOT / "docs" / "results"), ("10", tmp_path / "divided-10" / "pages")):
         monkeypatch.setattr("sys.argv", ["paper.py", "--list", "--divide", divide, "--runs-dir", str(tmp_path)])
         paper.main()
-        assert f"--write --out {folder}\n" in capsys.readouterr().out
+        typed = capsys.readouterr().out
+        assert f"--write --out {folder}\n" in typed
+        assert ("divided" in typed) == (divide != "1")  # nor do its runs count as real ones
 
 
 def test_times_are_kept_and_a_failure_ends_the_chain(tmp_path):

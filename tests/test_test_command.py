@@ -10,6 +10,7 @@ import pytest
 from stable_baselines3 import A2C, PPO, SAC
 
 import rss_shield.test
+import rss_shield.train
 from rss_shield.agents.load import algorithm_in, load_policy
 from rss_shield.agents.vec_env import VectorEnvAdapter
 
@@ -98,6 +99,23 @@ def test_a_card_says_on_which_road(model, tmp_path, capsys):
     assert told["env_id"] == "merge-v0"
     assert told["parameters"]["ego"]["response_time"] == rss_shield.PRESETS["slides"].ego.response_time
     assert set(pd.read_csv(folder / "episodes.csv")["train"]) == {"shielded"}
+
+
+def test_a_model_is_tested_behind_the_shield_that_it_was_trained_behind(capsys):
+    """Without anticipation the shield overrides more; and test seeds of one's own are kept, too."""
+    few = ["--total-timesteps", "64", "--n-envs", "8", "--eval-episodes", "6", "--config.duration", "10"]
+    seeds = ["--seeds", "0", "--first-seed", "1200000000"]
+    options = ["--rules.anticipation", "0", "--replace", "decision", "--no-pages", "--replay-episodes", "0"]
+    rss_shield.train.main(["--arms", "shielded", "--name", "a-run", *few, *seeds, *options])
+    run = Path("runs") / "a-run"
+    before = pd.read_csv(run / "episodes.csv")
+    assert before["seed"].min() == 1_200_000_000 and before["override_share"].max() > 0
+    model = str(run / "shielded-seed0" / "model.zip")
+    rss_shield.test.main([model, "--episodes", "6", "--first-seed", "1200000000", "--out", "out"])
+    after = pd.read_csv("out/episodes.csv")
+    columns = ["test", "seed", "return", "length", "blame", "override_share", "actions"]
+    pd.testing.assert_frame_equal(after[columns], before[columns])
+    assert "As on the card of the model: " in capsys.readouterr().err
 
 
 def test_continuous_actions_are_found_out(tmp_path, capsys):

@@ -19,7 +19,7 @@ import pandas as pd
 from rss_shield.eval import multipliers, removal
 from rss_shield.eval.arms import ARMS, OFF, ON, Arm
 from rss_shield.eval.frontier import plot_frontier
-from rss_shield.eval.metrics import METRICS, summarise, with_outcomes
+from rss_shield.eval.metrics import METRICS, RATES, paired, summarise, with_outcomes
 from rss_shield.eval.pages import command, markdown, write_page
 from rss_shield.eval.paper.compared import difference
 from rss_shield.eval.plots import joined_bins
@@ -126,17 +126,18 @@ def estimate(cell: pd.DataFrame, metric: str) -> Interval:
     """A mean over test episodes and, where there are several, training seeds."""
     seeds = [rows[metric].to_numpy(float) for _, rows in cell.groupby("train_seed")]
     pooled = np.concatenate(seeds)
-    is_rate = bool(np.isin(pooled, (0.0, 1.0)).all())
-    exact = clopper_pearson(int(pooled.sum()), pooled.size) if is_rate else None
-    if len(seeds) == 1:
-        mean = float(pooled.mean())
-        half = 1.96 * float(pooled.std(ddof=1)) / np.sqrt(pooled.size)
-        return exact or Interval(mean, mean - half, mean + half, pooled.size)
-    over = cluster_bootstrap(seeds, np.random.default_rng(0))
-    if exact is None:
-        lowest, highest = LIMITS.get(metric, (-np.inf, np.inf))
-        return over._replace(low=max(over.low, lowest), high=min(over.high, highest))
-    return over._replace(low=max(min(over.low, exact.low), 0.0), high=min(max(over.high, exact.high), 1.0))
+    if len(seeds) > 1:
+        over = cluster_bootstrap(seeds, np.random.default_rng(0))
+    else:
+        mean, half = float(pooled.mean()), 1.96 * float(pooled.std(ddof=1)) / np.sqrt(pooled.size)
+        over = Interval(mean, mean - half, mean + half, pooled.size)
+    if metric in RATES:
+        exact = clopper_pearson(int(pooled.sum()), pooled.size)
+        if len(seeds) == 1:
+            return exact
+        over = over._replace(low=min(over.low, exact.low), high=max(over.high, exact.high))
+    lowest, highest = LIMITS.get(metric, (-np.inf, np.inf))
+    return over._replace(low=max(over.low, lowest), high=min(over.high, highest))
 
 
 def per_decision(cell: pd.DataFrame, what: str) -> Interval:
@@ -150,9 +151,9 @@ def per_decision(cell: pd.DataFrame, what: str) -> Interval:
 
 def against(cell: pd.DataFrame, baseline: pd.DataFrame, metric: str = "return") -> Interval:
     """Cell minus a baseline that learns nothing, on the same test episodes."""
-    once = baseline.drop_duplicates("seed")[["seed", metric]]
-    pairs = cell.merge(once, on="seed", suffixes=("", "_baseline"))
-    return difference(pairs, pairs[metric], pairs[f"{metric}_baseline"], np.random.default_rng(0))
+    pairs = paired(cell, baseline.drop_duplicates("seed"), "_baseline")
+    there = pairs[f"{metric}_baseline"]
+    return difference(pairs, pairs[metric], there, np.random.default_rng(0), metric in RATES)
 
 
 def last_change(curve: pd.DataFrame) -> float:

@@ -3,15 +3,14 @@
 import numpy as np
 import pandas as pd
 
-from rss_shield.eval.metrics import with_outcomes
+from rss_shield.eval.metrics import RATES, paired, with_outcomes
 from rss_shield.eval.stats import Interval, cluster_difference, holm, mcnemar, paired_difference
 
 COMPARED = ("crash", "at_fault", "return")
-KEYS = ["train_seed", "seed"]
 
 
 def comparisons(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Paired by training seed and test episode.
+    """Paired by training seed and test episode; see `metrics.paired`.
 
     Args:
       episodes: one row per episode; columns train, test, train_seed, seed, crashed, blame, return.
@@ -24,14 +23,13 @@ def comparisons(episodes: pd.DataFrame) -> pd.DataFrame:
     cells = list(with_outcomes(episodes).groupby(["train", "test"], sort=False))
     rng, rows = np.random.default_rng(0), []
     for (train, test), cell in cells[1:]:
-        first = cells[0][1]
-        if cell["train_seed"].nunique() == 1 < first["train_seed"].nunique():  # who learns nothing is tested once
-            cell = pd.concat([cell.assign(train_seed=seed) for seed in first["train_seed"].unique()])
-        pairs = cell.merge(first, on=KEYS, suffixes=("", "_first"))
+        pairs = paired(cell, cells[0][1], "_first")
         for metric in COMPARED:
             here, there = pairs[metric].astype(float), pairs[f"{metric}_first"].astype(float)
-            row = {"train": train, "test": test, "metric": metric, **difference(pairs, here, there, rng)._asdict()}
-            if metric != "return":
+            is_rate = metric in RATES
+            found = difference(pairs, here, there, rng, is_rate)
+            row = {"train": train, "test": test, "metric": metric, **found._asdict()}
+            if is_rate:
                 discordant = mcnemar(here, there)
                 row |= {"only_here": discordant.only_first, "only_first": discordant.only_second, "p": discordant.p}
             rows.append(row)
@@ -42,18 +40,21 @@ def comparisons(episodes: pd.DataFrame) -> pd.DataFrame:
     return frame.assign(p_holm=corrected)
 
 
-def difference(pairs: pd.DataFrame, here: pd.Series, there: pd.Series, rng: np.random.Generator) -> Interval:
+def difference(
+    pairs: pd.DataFrame, here: pd.Series, there: pd.Series, rng: np.random.Generator, is_rate: bool
+) -> Interval:
     """Mean of here - there, over seeds and episodes from two training seeds on, else over episodes.
 
     Args:
       pairs: a row per pair of episodes; column train_seed.
       here, there: of the same rows.
+      is_rate: they are 0 or 1, so means of them differ by 1 at most.
     """
     seeds = [group.index for _, group in pairs.groupby("train_seed")]
     if len(seeds) < 2:
         return paired_difference(here, there, rng)
     interval = cluster_difference([here[rows] for rows in seeds], [there[rows] for rows in seeds], rng)
-    if here.isin([0.0, 1.0]).all():  # of rates, which differ by 1 at most
+    if is_rate:
         return interval._replace(low=max(interval.low, -1.0), high=min(interval.high, 1.0))
     return interval
 

@@ -47,11 +47,7 @@ def _tried(arguments: list[str]) -> None:
 
 
 def arguments_of(config: dict[str, Any]) -> list[str]:
-    """The command line of a task.
-
-    Raises:
-      ValueError: test seeds that training has not.
-    """
+    """The command line of a task."""
     tests, options = {name: config[name] for name in ("episodes", "first_seed")}, config["options"]
     words = training_words(config["environment"], [config["arm"]], [config["seed"]], tests, options)
     return [*words, "--replay-episodes", "0"]

@@ -117,6 +117,17 @@ def test_differences_are_paired_by_seed_whatever_the_order_of_rows():
     assert result.loc["crash", "n"] == 6
 
 
+def test_who_learns_nothing_is_paired_with_every_training_seed_whoever_comes_first():
+    trained = pd.concat(
+        [episodes_of([""] * 4, "on", "on").assign(train_seed=k, **{"return": 5.0 * k}) for k in range(3)]
+    )
+    scripted = episodes_of([""] * 4, "lazy", "on").assign(train_seed=0, **{"return": 1.0})
+    for cells, sign in (([scripted, trained], 1), ([trained, scripted], -1)):
+        row = differences(pd.concat(cells)).set_index("metric").loc["return"]
+        assert row[["value", "n", "seeds"]].tolist() == [sign * 4.0, 12, 3]
+        assert row["seed_low"] < sign * 4.0 < row["seed_high"]
+
+
 def of_seeds(*returns: list[float], blames=None) -> pd.DataFrame:
     """Training seeds 0, 1, ... with the returns of their test episodes."""
     return pd.concat(

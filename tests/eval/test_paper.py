@@ -83,6 +83,20 @@ def test_who_learns_nothing_is_compared_with_every_seed():
     scripted = episodes_of([""] * 20, "lazy", "on")
     compared = comparisons(pd.concat([frame, scripted], ignore_index=True)).set_index(["train", "test", "metric"])
     assert compared.loc["lazy", "on", "crash"]["only_first"] == 36
+    turned = comparisons(pd.concat([scripted, frame], ignore_index=True)).set_index(["train", "test", "metric"])
+    there, back = (one.loc[cell, "on", "return"] for one, cell in ((turned, "off"), (compared, "lazy")))
+    assert there["over"] == "seeds and episodes"
+    assert there["value"] == pytest.approx(1.0)  # of its three seeds they are 0, 1 and 2
+    assert there["low"] < there["value"] < there["high"]
+    assert np.isfinite(back["value"])
+
+
+def test_differences_to_a_car_that_stands_are_those_of_returns_and_not_of_rates():
+    moving = pd.concat([episodes_of([""] * 20, "on", "on").assign(train_seed=k, **{"return": 4.0 + k}) for k in (0, 1)])
+    standing = episodes_of([""] * 20, "slower", "on").assign(**{"return": 0.0})
+    row = comparisons(pd.concat([moving, standing])).set_index(["train", "metric"]).loc["slower", "return"]
+    assert row["value"] == pytest.approx(-4.5)
+    assert row["low"] <= row["value"] <= row["high"]
 
 
 def test_the_report_says_what_came_out_and_needs_no_network(folder, tmp_path):

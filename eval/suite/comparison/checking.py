@@ -17,7 +17,7 @@ from rss_shield.eval.arms import arm_named
 from rss_shield.eval.own import function_named, is_own
 from rss_shield.eval.suite.comparison.making import wrapped
 from rss_shield.eval.suite.comparison.naming import NAMES, valid_name
-from rss_shield.eval.suite.comparison.options import Config
+from rss_shield.eval.suite.comparison.options import FIRST_REMOVAL_SEED, FIRST_TEST_SEED, Config
 from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
 from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
@@ -75,6 +75,11 @@ def check(config: Config, program: str) -> None:
         ("removal_checks", config.removal_checks >= 0, "at least 0"),
         ("removal_episodes", config.removal_episodes >= 0, "at least 0"),
         ("eval_episodes", config.eval_episodes >= 1, "at least 1"),
+        (
+            "first_seed",
+            FIRST_TEST_SEED <= config.first_seed <= FIRST_REMOVAL_SEED - config.eval_episodes,
+            f"{FIRST_TEST_SEED} to {FIRST_REMOVAL_SEED} less the episodes, apart from the seeds of training",
+        ),
         ("replay_episodes", config.replay_episodes >= 0, "at least 0"),
         ("explore_for", 1 <= config.explore_for <= 1000, "1 to 1000"),
         ("history", 1 <= config.history <= LONGEST, f"1 to {LONGEST}"),

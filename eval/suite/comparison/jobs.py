@@ -22,7 +22,7 @@ from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.suite import showcase
 from rss_shield.eval.suite.comparison.acting import driver, learner
 from rss_shield.eval.suite.comparison.making import batch, original, test_batch
-from rss_shield.eval.suite.comparison.options import FIRST_REMOVAL_SEED, FIRST_TEST_SEED, Config
+from rss_shield.eval.suite.comparison.options import FIRST_REMOVAL_SEED, Config
 from rss_shield.eval.suite.scored import columns_of, scored
 from rss_shield.shield.params import Preset
 
@@ -112,7 +112,7 @@ def _test(config: Config, preset: Preset, folder: Path, arm: str, seed: int, tes
     row = arm_named(arm)
     policy = driver(config, preset, row, seed) if row.scripted else load_policy(model_path(folder, arm, seed))
     count = config.eval_episodes
-    episodes = _played(config, preset, row, row.tests[test], policy, FIRST_TEST_SEED, count, progress)
+    episodes = _played(config, preset, row, row.tests[test], policy, config.first_seed, count, progress)
     write_cell(cell_path(folder, arm, seed, test), episodes, arm, seed, test)
 
 

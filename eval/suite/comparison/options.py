@@ -11,7 +11,7 @@ from rss_shield.command_line import NO_OVERRIDES, ConfigFile, Overrides
 from rss_shield.shield.params import PRESETS, Rules
 
 COMMAND = "rss-shield train"  # what messages call it, unless a script was called
-FIRST_TEST_SEED = 10**9  # test episode i: FIRST_TEST_SEED + i; training seeds stay below 2**30
+FIRST_TEST_SEED = 10**9  # test episode i: this + i; training seeds stay below 2**29
 FIRST_REMOVAL_SEED = 2 * 10**9  # likewise of the tests on the way, far from both
 DEFAULT_RULES = Rules()
 PRESET_HELP = (
@@ -122,6 +122,9 @@ class Config:
     contact is its fault)."""
     eval_episodes: int = 1000
     """Test episodes per trained model and test condition, on the same seeds for all."""
+    first_seed: int = FIRST_TEST_SEED
+    """Seed of the first test episode; the others follow. What is chosen by tests, such as hyperparameters, is to be
+    tested on others afterwards."""
     replay_episodes: int = 5
     """How many of these are played again on the original simulator and compared; none if it is the backend."""
     pages: bool = True

@@ -10,7 +10,7 @@ from rss_shield.eval.arms import arm_named
 from rss_shield.eval.own import digests
 from rss_shield.eval.run_folder import changes
 from rss_shield.eval.suite.comparison.acting import learner
-from rss_shield.eval.suite.comparison.options import FIRST_TEST_SEED, Config
+from rss_shield.eval.suite.comparison.options import Config
 from rss_shield.shield.params import Preset, Rules
 
 _NOT_RECORDED = ("list_arms", "workers", "tracker", "name", "runs_dir", "resume", "resume_or_start", "overwrite")
@@ -45,5 +45,5 @@ def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
             if not arm.scripted
         },
         **({"sources": own} if own else {}),
-        "test_seeds": {"first": FIRST_TEST_SEED, "last": FIRST_TEST_SEED + config.eval_episodes - 1},
+        "test_seeds": {"first": config.first_seed, "last": config.first_seed + config.eval_episodes - 1},
     }
