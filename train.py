@@ -18,7 +18,7 @@ from rss_shield.eval.run_folder import open_run
 from rss_shield.eval.suite.comparison.jobs import cells_of, in_engine, model_path, replaying, showing, testing, training
 from rss_shield.eval.suite.comparison.options import COMMAND, Config
 from rss_shield.eval.suite.comparison.reading import resolve, started
-from rss_shield.eval.suite.comparison.record import options_of, record
+from rss_shield.eval.suite.comparison.record import DERIVED, options_of, record
 from rss_shield.eval.suite.comparison.trying import tried
 
 PROGRAM = "train.py" if __name__ == "__main__" else COMMAND  # as it was called
@@ -31,13 +31,13 @@ def main(arguments: list[str]) -> None:
     try:
         config, folder = started(arguments, PROGRAM)
         preset = resolve(config)
-        env = tried(config, preset)
+        recorded = record(config, preset, tried(config, preset))
         warnings = open_run(
             folder,
-            record(config, preset, env),
+            recorded,
             resume=config.resume,
             overwrite=config.overwrite,
-            defaults=options_of(Config()),
+            defaults={**options_of(Config()), DERIVED: recorded[DERIVED]},
         )
     except (ValueError, OSError) as error:
         fail(PROGRAM, str(error))

@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rss_shield.envs.arguments import plain
 from rss_shield.eval.arms import arm_named
 from rss_shield.eval.files import write_json, write_text
 from rss_shield.eval.metrics import METRICS, Metric, with_outcomes
 from rss_shield.eval.pages import markdown
 from rss_shield.eval.stats import Interval, student, wilson
-from rss_shield.eval.suite.comparison.making import changed_options
 from rss_shield.eval.table import rounded
 
 ON_CARD = (
@@ -50,7 +48,7 @@ def card_of(arm: str, seed: int, run: dict[str, Any], episodes: pd.DataFrame) ->
         **{name: config[name] for name in SETTING},
         "history": config.get("history", 1),
         "config": {**config["config"], **row.config},
-        "options": plain(changed_options(config)),
+        "options": config.get("shield_options", {}),
         "training": {
             **{name: config[name] for name in TRAINING},
             **({"reward": config["reward"]} if config.get("reward") else {}),

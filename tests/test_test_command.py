@@ -10,7 +10,7 @@ import pytest
 from stable_baselines3 import A2C, PPO, SAC
 
 import rss_shield.test
-import rss_shield.train
+from rss_shield import train
 from rss_shield.agents.load import algorithm_in, load_policy
 from rss_shield.agents.vec_env import VectorEnvAdapter
 
@@ -106,7 +106,7 @@ def test_a_model_is_tested_behind_the_shield_that_it_was_trained_behind(capsys):
     few = ["--total-timesteps", "64", "--n-envs", "8", "--eval-episodes", "6", "--config.duration", "10"]
     seeds = ["--seeds", "0", "--first-seed", "1200000000"]
     options = ["--rules.anticipation", "0", "--replace", "decision", "--no-pages", "--replay-episodes", "0"]
-    rss_shield.train.main(["--arms", "shielded", "--name", "a-run", *few, *seeds, *options])
+    train.main(["--arms", "shielded", "--name", "a-run", *few, *seeds, *options])
     run = Path("runs") / "a-run"
     before = pd.read_csv(run / "episodes.csv")
     assert before["seed"].min() == 1_200_000_000 and before["override_share"].max() > 0

@@ -136,8 +136,7 @@ def test_a_card_says_what_a_model_is_and_does(tmp_path):
     assert "| crash [%] | 40.0 [11.8, 76.9] | 0.0 [0.0, 43.4] |" in text
     assert "rss-shield test model.zip" in text
     assert card["options"] == {} and "Options of the shield" not in text
-    config |= {"filter": "ttc", "filter_at": 2.0, "rules": {"memory": False}, "correction": "nearest"}
+    config["shield_options"] = {"filter": "ttc", "filter_at": 2.0, "rules": {"memory": False}}
     write_card(tmp_path, "maskable", 3, {"config": config, "python": "3"}, episodes)
-    options = json.loads((tmp_path / "card.json").read_text())["options"]
-    assert options.pop("rules")["memory"] is False
-    assert options == {"filter": "ttc", "filter_at": 2.0}
+    assert json.loads((tmp_path / "card.json").read_text())["options"] == config["shield_options"]
+    assert "Options of the shield that are not its defaults: {'filter': 'ttc'" in (tmp_path / "card.md").read_text()

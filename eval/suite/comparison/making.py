@@ -9,7 +9,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 import rss_shield
 from rss_shield.agents.history import with_history
-from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.highway.idm_ego import make_idm_vec
 from rss_shield.envs.options import Options
 from rss_shield.eval.arms import Arm
@@ -52,13 +51,6 @@ def setting(config: Config, arm: Arm) -> dict[str, Any]:
 
 def wrapped(config: Config) -> dict[str, Any]:
     """Other options of the shield's, as far as they are not its defaults; what an arm says comes before them."""
-    return changed_options(vars(config))
-
-
-def changed_options(config: Mapping[str, Any]) -> dict[str, Any]:
-    """The same from options by name, those of a run's record too: of an older run some are not there."""
     default = Options()
-    given = {name: config[name] for name in WRAPPED if name in config}
-    if "rules" in given:
-        given["rules"] = rules_of(given["rules"])
+    given = {name: getattr(config, name) for name in WRAPPED}
     return {name: value for name, value in given.items() if value != getattr(default, name)}

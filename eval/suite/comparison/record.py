@@ -5,14 +5,17 @@ from typing import Any
 
 import gymnasium as gym
 
+from rss_shield.envs.arguments import plain
 from rss_shield.envs.options import PLANS, scheme_of
 from rss_shield.eval.arms import arm_named
 from rss_shield.eval.own import digests
 from rss_shield.eval.run_folder import changes
 from rss_shield.eval.suite.comparison.acting import learner
+from rss_shield.eval.suite.comparison.making import wrapped
 from rss_shield.eval.suite.comparison.options import Config
 from rss_shield.shield.params import Preset, Rules
 
+DERIVED = "shield_options"  # of other options; older runs do not have it
 _NOT_RECORDED = ("list_arms", "workers", "tracker", "name", "runs_dir", "resume", "resume_or_start", "overwrite")
 
 
@@ -36,6 +39,7 @@ def record(config: Config, preset: Preset, env: gym.Env) -> dict[str, Any]:
             "roads_cross": scheme_of(env.unwrapped) == PLANS,  # otherwise entry, intent and waiting change nothing
             "rules": config.rules._asdict(),  # the margins of the published table
         },
+        DERIVED: plain(wrapped(config)),
         "environment": env.unwrapped.config,  # type: ignore[attr-defined]  # the whole of it
         **{
             arm.name if arm.settings else arm.learner: learner(config, arm).hyperparameters(
