@@ -87,10 +87,13 @@ def of_sweep(
     paragraphs, x, y = [], metric_named(performance).label, metric_named(safety).label
     for label, rows in groups:
         points = table.iloc[rows]
+        where = f"{label}: " if label else ""
         front = points[points["front"]].sort_values(performance, ascending=False)
+        if front.empty:
+            paragraphs.append(f"{where}None of {len(points)} points has both {x} and {y}.")
+            continue
         best = front.iloc[0]
         named = ", ".join(f"{name} = {best[name]}" for name in axes)
-        where = f"{label}: " if label else ""
         paragraphs.append(
             f"{where}{len(front)} of {len(points)} points are on the Pareto front of {y} and {x}. "
             f"The best {x} there is {best[performance]:.3g}, with {y} {best[safety]:.3g} ({named})."

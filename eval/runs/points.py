@@ -1,5 +1,6 @@
 """Safety-performance points of an experiment: a row per point, with intervals, and which are on the Pareto front."""
 
+from collections.abc import Collection, Iterable
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,18 @@ def metric_named(name: str) -> Metric:
         if metric.name == name:
             return metric
     raise ValueError(f"metric = {name!r}: expected one of {', '.join(metric.name for metric in METRICS)}")
+
+
+def check_there(metrics: Iterable[str], columns: Collection[str], of: str) -> None:
+    """Do episodes, or points, have the metrics that are asked for?
+
+    Raises:
+      ValueError: names one that they have not, and those that they have.
+    """
+    for name in metrics:
+        if name not in columns:
+            there = ", ".join(metric.name for metric in metrics_in(columns))
+            raise ValueError(f"metric = {name!r}: {of} have none; expected one of {there}")
 
 
 def point_row(
@@ -79,7 +92,11 @@ def with_front(wide: pd.DataFrame, safety: str, performance: str) -> pd.DataFram
 
     Args:
       wide: a row per point; columns of the metrics' values.
+
+    Raises:
+      ValueError: one of the metrics is no column.
     """
+    check_there((safety, performance), wide.columns, "these points")
     metrics = (metric_named(name) for name in (safety, performance))
     costs = np.column_stack([wide[metric.name] * (1.0 if metric.less_is_better else -1.0) for metric in metrics])
     front = np.zeros(len(wide), bool)

@@ -20,11 +20,12 @@ import pandas as pd
 import tyro
 
 from rss_shield.eval.files import refuse, to_json, write_json
+from rss_shield.eval.metrics import with_outcomes
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.run_folder import versions
 from rss_shield.eval.runs.backends import Outcome, Work, run_tasks
 from rss_shield.eval.runs.experiment import Experiment, read_experiment
-from rss_shield.eval.runs.points import metric_named, point_row
+from rss_shield.eval.runs.points import check_there, metric_named, point_row
 from rss_shield.eval.runs.store import ERROR, Files, Store
 from rss_shield.eval.runs.tables import write_points
 from rss_shield.eval.runs.tasks import Task, samples_of, tasks_of
@@ -79,6 +80,8 @@ class Sweep:
         self.store = Store(folder / "tasks")
         self.tasks: list[Task] = []  # all so far, in their order
         self.failed: list[Outcome] = []
+        self.checked = False  # that episodes have these:
+        self.metrics = metrics_of(experiment)
 
     def run(self) -> None:
         experiment = self.experiment
@@ -93,6 +96,7 @@ class Sweep:
         """Run what is not there yet."""
         check_tasks(tasks)
         self.tasks += tasks
+        self._check_metrics(tasks)
         missing = list({task.key: task for task in tasks if not self.store.has(task)}.values())
         with progress_bar(len(tasks), self.experiment.name, "task") as bar:
             bar.update(len(tasks) - len(missing))
@@ -102,7 +106,21 @@ class Sweep:
                     self.store.fail(outcome.task, outcome.error)
                 else:
                     self.store.put(outcome.task, outcome.files)
+                    self._check_metrics([outcome.task])
                 bar.update()
+
+    def _check_metrics(self, tasks: list[Task]) -> None:
+        """Do the episodes of the first task that is there have what the experiment is about? Not after the last one.
+
+        Raises:
+          ValueError: they have not; of several environments others may have it.
+        """
+        there = next((task for task in tasks if self.store.has(task)), None)
+        if there is None or self.checked or len(self.experiment.environments) > 1:
+            return
+        columns = with_outcomes(self.episodes(there)).columns
+        check_there(self.metrics, columns, f"episodes on {there.config['environment']} with these options")
+        self.checked = True
 
     def why(self, outcome: Outcome) -> str:
         """One line: which task failed, of what, and where more is said."""
@@ -176,6 +194,12 @@ def _suggest(trial: Any, name: str, space: Any) -> Any:
     return trial.suggest_categorical(name, list(space))
 
 
+def metrics_of(experiment: Experiment) -> list[str]:
+    """What an experiment is about: its axes, and what Optuna is told."""
+    objectives = experiment.drawn.objectives if experiment.drawn is not None else ()
+    return [experiment.safety, experiment.performance, *(metric for metric, _ in objectives)]
+
+
 def check_tasks(tasks: list[Task]) -> None:
     """Refuse bad options before anything runs."""
     for environment in dict.fromkeys(task.config["environment"] for task in tasks):
@@ -200,7 +224,7 @@ def sweep(experiment: Experiment, folder: Path, work: Work = do_task, file: str 
     Raises:
       ValueError: options out of range; a metric that the episodes have not.
     """
-    for name in (experiment.safety, experiment.performance):
+    for name in metrics_of(experiment):
         metric_named(name)
     folder.mkdir(parents=True, exist_ok=True)
     for warning in _record(experiment, folder, file):

@@ -146,6 +146,34 @@ def test_a_task_that_fails_says_so_in_one_line_and_is_done_again(tmp_path, monke
         main(["sweep", "e.yaml"])  # what failed is not taken for done
 
 
+@pytest.mark.parametrize(
+    ("text", "tasks", "said"),
+    [
+        (
+            "axes: {safety: crash, performance: success}",
+            1,
+            "metric = 'success': episodes on highway-fast-v0 with these",
+        ),
+        ("axes: {performance: own_return}\nseeds: [0, 1, 2]", 1, "metric = 'own_return': episodes on highway-fast-v0"),
+        (
+            "sweep: {optuna: {trials: 2, over: {ego.response_time: [0.5, 1.0]}, objectives: {retrun: maximize}}}",
+            0,
+            "metric = 'retrun': expected one of crash,",
+        ),
+    ],
+)
+def test_a_metric_that_the_episodes_have_not_is_said_after_the_first_and_not_after_the_last(
+    tmp_path, monkeypatch, capsys, text, tasks, said
+):
+    monkeypatch.chdir(tmp_path)
+    options = "options: {config.duration: 3}\ntests: {episodes: 1}"
+    (tmp_path / "e.yaml").write_text(f"policies: [idle, slower]\n{options}\n{text}\n")
+    with pytest.raises(SystemExit) as stop:
+        main(["sweep", "e.yaml"])
+    assert stop.value.code == 2 and said in capsys.readouterr().err
+    assert len(list((tmp_path / "runs").glob("e/tasks/*/episodes.csv"))) == tasks
+
+
 def test_an_option_is_set_once():
     sweep = {"list": {"a": {"rules.memory": False}}, "grid": {"rules.memory": [True]}}
     with pytest.raises(ValueError, match=r"rules.memory is in sweep.list and varied as well"):

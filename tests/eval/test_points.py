@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from rss_shield.eval.metrics import METRICS
+from rss_shield.eval.paper.words import of_sweep
 from rss_shield.eval.runs.points import with_front
 from rss_shield.eval.runs.tables import plot_front
 
@@ -21,6 +22,13 @@ def test_what_is_called_a_largest_value_is_better_small_and_a_smallest_one_bette
     for metric in METRICS:
         if metric.name.startswith(("max_", "min_")):
             assert metric.less_is_better == metric.name.startswith("max_")
+
+
+def test_where_no_point_has_both_metrics_that_is_said():
+    table = pd.DataFrame({"policy": ["a", "b"], "crash": [0.0, 0.5], "time_to_goal": [np.nan, np.nan]})
+    table = with_front(table, "crash", "time_to_goal")
+    (said,) = of_sweep(table, ["policy"], [("", [0, 1])], "crash", "time_to_goal")
+    assert said == "None of 2 points has both time to goal and crash."
 
 
 @pytest.mark.parametrize("groups", [1, 2, 3, 4, 5])

@@ -240,6 +240,24 @@ def test_frames_may_be_told_in_seconds(tmp_path):
     assert read_csv(written(table, tmp_path), known._replace(units={"t": "s"})).dt == pytest.approx(DT)
 
 
+@pytest.mark.parametrize("dt", [0.05, 0.2, 1.0])
+@pytest.mark.parametrize("start", [0.0, 1.6e9])
+def test_in_other_steps_nobody_is_where_the_log_does_not_have_them(tmp_path, dt, start):
+    """At 30 m/s all along, from the first row of each to the last; steps that end in between show neither's end."""
+    tables = []
+    for name, first, last in (("a", 0, 30), ("b", 1, 29), ("c", 4, 26)):
+        t = np.round(0.1 * np.arange(first, last + 1), 3)
+        tables.append(pd.DataFrame({"id": name, "t": start + t, "x": 30.0 * t, "y": 4.0 * first}))
+    users = read_csv(written(pd.concat(tables), tmp_path), dt=dt).users
+    time = dt * np.arange(len(users.x))
+    for name, first, last in (("a", 0.0, 3.0), ("b", 0.1, 2.9), ("c", 0.4, 2.6)):
+        i = users.ids.index(name)
+        inside = (time >= first - 1e-4) & (time <= last + 1e-4)
+        np.testing.assert_array_equal(users.present[:, i], inside)
+        np.testing.assert_allclose(users.x[inside, i], 30.0 * time[inside], atol=1e-4)
+        np.testing.assert_allclose(users.speed[inside, i], 30.0, atol=1e-2)
+
+
 def test_options_of_csv_files_are_for_these_only(capsys):
     assert "--dt 0.1: expected with .csv files only; a.npz" in refused(capsys, "judge", "a.npz", "--dt", "0.1")
 

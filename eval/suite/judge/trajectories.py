@@ -118,7 +118,8 @@ def read_csv(
         for name, sizes in (("length", length), ("width", width)):
             if name in own:
                 sizes[i] = float(own[name].median())
-        _put(own, time, step, length[i], width[i], known.point, {name: array[:, i] for name, array in state.items()})
+        into = {name: array[:, i] for name, array in state.items()}
+        _put(own, time, step, 0.5 * step if dt is None else 0.0, length[i], width[i], known.point, into)
     kinds = ["unknown"] * len(ids)
     if known.kind in rows.columns:
         wrong = ~rows[known.kind].fillna("unknown").isin(KINDS)
@@ -193,12 +194,26 @@ def _step(path: str | Path, times: np.ndarray) -> float:
     return step
 
 
-def _put(own: pd.DataFrame, time: np.ndarray, step: float, length: float, width: float, point: str, into: dict) -> None:
-    """One user's rows onto the common times; between rows that are farther apart than two steps it is not there."""
+def _put(
+    own: pd.DataFrame,
+    time: np.ndarray,
+    step: float,
+    slack: float,
+    length: float,
+    width: float,
+    point: str,
+    into: dict[str, np.ndarray],
+) -> None:
+    """One user's rows onto the common times; between rows that are farther apart than two steps it is not there.
+
+    Args:
+      slack: a sample that is so much before the first row, or after the last, is that row's [s].
+    """
     t, x, y = (own[name].to_numpy() for name in ("t", "x", "y"))
     apart = max(step, float(np.median(np.diff(t)))) if len(t) > 1 else step
     for a, b in zip(*_runs(t, 2.0 * apart), strict=True):
-        here = np.flatnonzero((time >= t[a] - 0.5 * step) & (time <= t[b - 1] + 0.5 * step))
+        close = slack + 1e-6 * step + 4.0 * float(np.spacing(np.abs(t).max()))  # times may be seconds since 1970
+        here = np.flatnonzero((time >= t[a] - close) & (time <= t[b - 1] + close))
         if not len(here):
             continue
         run = slice(a, b)
