@@ -2,7 +2,8 @@
 
 An observation is a list of rows, `[V, F]`, the ego's first, or a history of them, `[H, V, F]` (`agents.history`). Rows
 of zeros stand for nobody. A plain network has weights of its own for every place in the list; these have the same for
-everybody, so that it is the same to them who is listed third and who is listed fourth.
+everybody, so that it is the same to them who is listed third and who is listed fourth. Of a history the rows in one
+place of all its lists count as one road user; where lists are sorted by distance, somebody else may have been there.
 """
 
 from collections.abc import Mapping

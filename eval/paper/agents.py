@@ -30,8 +30,10 @@ from rss_shield.shield.verdicts import AT_FAULT
 PAGE = "agents.md"
 BASELINES = ("lazy", "idm")
 SELDOM = 0.10  # share of frames overridden, at most
+RISING = 0.02  # of a multiplier over the last fifth of training, at most, if it is at rest
 NEARLY = 0.02  # of the best return, lost at most
 HARMLESS = 0.01  # crashes without the shield, at most
+WORTHWHILE = 0.5  # of the best return, at least: who stands, or leaves the road, meets nobody either
 FLAT = 0.02  # change of the return over the last fifth of training, at most, in parts of its size
 LIMITS = {metric.name: metric.limits for metric in METRICS}  # what a value can be
 CALLED = {arm.called: arm for arm in ARMS.values()}
@@ -272,7 +274,7 @@ def learns(arm: str) -> bool:
 def questions(road: Road, cells: dict[tuple[str, str], pd.DataFrame]) -> str:
     """Who lets the shield sleep and earns as much, who is harmless without it, who meets the limit of costs."""
     best = best_behind_shield(cells)
-    asleep, harmless = [], []
+    asleep, harmless, useless = [], [], []
     for (arm, test), cell in cells.items():
         if not learns(arm):
             continue
@@ -281,12 +283,15 @@ def questions(road: Road, cells: dict[tuple[str, str], pd.DataFrame]) -> str:
             if share <= SELDOM and earned >= best - NEARLY * abs(best):
                 asleep.append(f"`{arm}` ({100 * share:.1f} %, {earned:.1f})")
         if test == OFF and mean_of(cell, "crash") <= HARMLESS:
-            harmless.append(f"`{arm}` ({percent(estimate(cell, 'crash'))} %)")
+            earned = mean_of(cell, "return")
+            name = f"`{arm}` ({percent(estimate(cell, 'crash'))} %, return {earned:.1f})"
+            (harmless if earned >= WORTHWHILE * best else useless).append(name)
     lines = [
         f"Overridden in at most {100 * SELDOM:.0f} % of the frames with at least {100 * (1 - NEARLY):.0f} % of the "
         f"best return behind the shield ({best:.1f}): {', '.join(asleep) or 'nobody'}.",
         f"Crashes in at most {100 * HARMLESS:.0f} % of the episodes without the shield: "
-        f"{', '.join(harmless) or 'nobody'}.",
+        f"{', '.join(harmless) or 'nobody'}."
+        + (f" So do these, which earn less than half of the best: {', '.join(useless)}." if useless else ""),
     ]
     lines += sentences_on_costs(road.prices[road.prices["arm"] == "ppo-lagrangian"], cells)
     return "\n".join(f"- {line}" for line in lines)
@@ -303,7 +308,7 @@ def sentences_on_costs(prices: pd.DataFrame, cells: dict[tuple[str, str], pd.Dat
     multiplied = ", ".join(f"{price:.2f}" for price in per_seed["multiplier"])
     yield (
         f"Cost per decision of PPO-Lagrangian in the last fifth of training, by seed: {paid}; its limit is {limit:g}; "
-        f"multiplier {multiplied}."
+        f"multiplier {multiplied}{_still_rising(late)}."
     )
     costs = {arm: per_decision(cell, "cost") for (arm, test), cell in cells.items() if test == OFF}
     if "ppo-lagrangian" in costs:
@@ -317,6 +322,25 @@ def sentences_on_costs(prices: pd.DataFrame, cells: dict[tuple[str, str], pd.Dat
             f"Of drivers that learn nothing `{least}` ({ARMS[least].label}) costs least without the shield: "
             f"{number(others[least], 4)}."
         )
+
+
+def _still_rising(late: pd.DataFrame) -> str:
+    """Was a multiplier not at rest in the last fifth of training?"""
+    rises = late.groupby("train_seed")["multiplier"].agg(lambda price: price.iloc[-1] - price.iloc[0])
+    return ", still rising when training ended" if (rises > RISING * late["multiplier"].mean()).any() else ""
+
+
+def other_filters(road: Road, arms: Sequence[Arm], cells: dict[tuple[str, str], pd.DataFrame]) -> list[str]:
+    """A table of agents behind the filters that they were trained behind."""
+    tested = [(arm, cells[arm.name, test]) for arm in arms for test in arm.tests if (arm.name, test) in cells]
+    rows = []
+    for arm, cell in tested:
+        if cell["test"].iloc[0] not in (OFF, ON):
+            rates = [percent(estimate(cell, metric)) for metric in ("at_fault", "crash")]
+            means = [number(estimate(cell, metric)) for metric in ("return", "mean_acceleration_change")]
+            rows.append([f"`{arm.name}`", *rates, *means])
+    heading = ["arm", "ego at fault [%]", "crashes [%]", "return", "change [m/s²]"]
+    return ["Behind the filters that these were trained behind:", markdown([heading, *rows])] if rows else []
 
 
 def figures_of(road: Road, folder: Path) -> Iterator[str]:
@@ -353,6 +377,7 @@ def section_of(road: Road, folder: Path) -> list[str]:
         first_sentences(road, cells),
         f"{episodes} test episodes per arm, seed and test.",
         markdown([TABLE_HEADING, *(row_of(arm, road, cells) for arm in arms)]),
+        *other_filters(road, arms, cells),
         *_goals(road, arms, cells),
         questions(road, cells),
         *figures_of(road, folder),

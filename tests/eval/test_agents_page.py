@@ -136,9 +136,36 @@ def test_an_agent_that_pays_more_than_any_limit_is_said_not_to_meet_it():
         ("lazy", "off"): pd.DataFrame({"train_seed": 0, "cost": [9.0, 8.9, 9.1], "length": 10}),
     }
     in_training, tested, least = agents.sentences_on_costs(prices, cells)
-    assert "0.3000; its limit is 0.01; multiplier 2.00" in in_training
+    assert in_training.endswith("0.3000; its limit is 0.01; multiplier 2.00.")
     assert "it costs 0.3000" in tested and tested.endswith("it does not meet it.")
     assert "`slower`" in least and "0.1000" in least
+
+
+def test_a_multiplier_that_is_not_at_rest_is_said_to_rise():
+    prices = pd.DataFrame({"timesteps": range(0, 100, 10), "measured": 0.3, "target": 0.01, "train_seed": 0})
+    for multiplier, rises in ((np.full(10, 7.0), False), (0.5 * np.arange(10), True)):
+        (said, *_) = agents.sentences_on_costs(prices.assign(multiplier=multiplier), {})
+        assert said.endswith(", still rising when training ended.") == rises
+
+
+def test_who_leaves_the_road_is_not_called_harmless_without_what_it_earns(runs):
+    (road,) = agents.roads_in(runs)
+    cells = agents.cells_of(road)
+    safe = cells["unshielded", "off"].assign(crash=False, crashed=False)
+    for earned, named in ((20.0, True), (2.0, False)):
+        said = agents.questions(road, {**cells, ("unshielded", "off"): safe.assign(**{"return": earned})}).splitlines()[
+            1
+        ]
+        assert ("nobody" not in said) == named and f"return {earned:.1f})" in said
+        assert ("which earn less than half of the best" in said) != named
+
+
+def test_agents_behind_other_filters_have_a_table(runs):
+    (road,) = agents.roads_in(runs)
+    cells = agents.cells_of(road)
+    cells["ttc", "ttc"] = cells["shielded", "on"].assign(train="ttc", test="ttc")
+    (_, table) = agents.other_filters(road, [agents.ARMS["shielded"], agents.ARMS["ttc"]], cells)
+    assert "| `ttc` | 0.0 [" in table and "`shielded`" not in table
 
 
 def test_an_interval_over_few_seeds_stays_inside_what_can_be():

@@ -48,8 +48,10 @@ examples:
       drivers that learn nothing beside agents, one of which pays until the shield changes 0.5 m/s^2 on average
   python train.py --arms shielded my_driver:drive --reward my_reward:reward --preset my-table.yaml
       your own: a policy, a reward, a table of parameters
-  python train.py --env-id intersection-v0 --history 2 --network attention
-      an agent that sees how others move, and to whom it is the same who is listed first
+  python train.py --env-id intersection-v0 --network sets --config.observation.observe-intentions true
+      an agent that is told where others are going, and to whom it is the same who is listed first
+  python train.py --env-id merge-v0 --history 3
+      one that sees its last three observations
   python train.py --list-arms
       all there are
   python train.py --resume --name my-run
