@@ -27,7 +27,11 @@ from rss_shield.eval.runs.experiment import Experiment, read_experiment  # noqa:
 
 SWEEPS = ("ablation", "rules", "presets", "response-times", "intersection")
 ON_THEIR_PAGE = ("presets", "response-times", "intersection")
-COMPARED = {"highway-fast-v0": 200_000, "intersection-v0": 50_000}  # decisions of the runs on the page of PPO
+# environment -> decisions of the runs on the page of PPO, and their further options
+COMPARED = {
+    "highway-fast-v0": (200_000, ["--seeds", "0", "1", "2"]),
+    "intersection-v0": (50_000, ["--intent", "known", "--seeds", "0", "1", "2", "3", "4"]),
+}
 ADVERSARIES = 2000  # episodes a row of the ablation
 TIMES = "paper-times.csv"
 
@@ -57,10 +61,10 @@ def steps_of(arguments: argparse.Namespace) -> Iterator[Step]:
     yield Step("ablation: page", words)
     swept = [str(runs / name) for name in ON_THEIR_PAGE]
     yield Step("sweeps: page", ["-m", "rss_shield.eval.paper.sweeps", *swept, "--out", out])
-    for env_id, decisions in COMPARED.items():
-        words = ["train.py", "--env-id", env_id, "--total-timesteps", str(max(decisions // divide, 1))]
+    for env_id, (decisions, further) in COMPARED.items():
+        words = ["train.py", "--env-id", env_id, "--total-timesteps", str(max(decisions // divide, 1)), *further]
         words += ["--runs-dir", str(runs), "--name", env_id, "--resume-or-start", *workers, *_small(divide, pages=True)]
-        yield Step(f"compare: {env_id}", words if divide == 1 else [*words, "--seeds", "0", "1"])
+        yield Step(f"compare: {env_id}", words if divide == 1 else [*words, "--seeds", "0", "1"])  # the last ones count
     compared = [str(runs / env_id) for env_id in COMPARED]
     yield Step("compare: page", ["-m", "rss_shield.eval.pages", *compared, "--out", out])
     every = [*compared, *(str(folder_of(part, runs)) for part in PLANS[plan]), *(str(runs / name) for name in SWEEPS)]

@@ -274,7 +274,9 @@ def learns(arm: str) -> bool:
 def questions(road: Road, cells: dict[tuple[str, str], pd.DataFrame]) -> str:
     """Who lets the shield sleep and earns as much, who is harmless without it, who meets the limit of costs."""
     best = best_behind_shield(cells)
-    asleep, harmless, useless = [], [], []
+    asleep: list[str] = []
+    harmless: list[str] = []
+    useless: list[str] = []
     for (arm, test), cell in cells.items():
         if not learns(arm):
             continue
