@@ -163,30 +163,49 @@ def turned(frame: pd.DataFrame, headings: Sequence[str]) -> pd.DataFrame:
     return pd.concat([cells, frame[chosen]], axis=1)
 
 
+def returns_by_road(folders: Sequence[Path]) -> dict[str, pd.Series]:
+    """Environment, and its configuration if it has one of its own -> mean return by train, test and train_seed.
+
+    Of a cell in several runs on one road the first counts.
+    """
+    roads: dict[str, pd.Series] = {}
+    for folder in folders:
+        if not ((folder / "episodes.csv").exists() and (folder / "config.json").exists()):
+            continue
+        config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
+        own = f" {json.dumps(config['config'], sort_keys=True)}" if config.get("config") else ""
+        road = f"{config['env_id']}{own}"
+        means = with_outcomes(read_episodes(folder)).groupby(["train", "test", "train_seed"])["return"].mean()
+        if road in roads:
+            new = ~means.index.droplevel("train_seed").isin(roads[road].index.droplevel("train_seed"))
+            means = pd.concat([roads[road], means[new]])
+        roads[road] = means
+    return roads
+
+
+def scores_of(roads: dict[str, pd.Series]) -> dict[str, np.ndarray]:
+    """Cell -> `[S, R]` returns from 0 (the worst cell of a road) to 1 (its best), of the seeds that all roads have."""
+    columns = []
+    for returns in roads.values():
+        means = returns.groupby(["train", "test"]).mean()
+        span = means.max() - means.min()
+        columns.append((returns - means.min()) / (span if span > 0 else 1.0))
+    cells = pd.concat(columns, axis=1, join="inner").groupby(["train", "test"], sort=False)
+    return {" / ".join(map(str, cell)): rows.to_numpy() for cell, rows in cells}
+
+
 def across_roads(folders: Sequence[Path], figures: Path) -> Section | None:
-    """What arms do on several roads together; None for fewer than two runs, or cells that they do not share."""
-    runs = [folder for folder in folders if (folder / "episodes.csv").exists() and (folder / "config.json").exists()]
-    if len(runs) < 2:
-        return None
-    returns = [
-        with_outcomes(read_episodes(folder)).groupby(["train", "test", "train_seed"])["return"].mean()
-        for folder in runs
-    ]
-    cells = [
-        cell for cell in dict.fromkeys(key[:2] for key in returns[0].index) if all(cell in r.index for r in returns)
-    ]
-    scores = {}
-    for cell in cells:
-        columns = []
-        for one in returns:
-            worst, best = (getattr(one.groupby(["train", "test"]).mean(), end)() for end in ("min", "max"))
-            columns.append((one.loc[cell].to_numpy() - worst) / (best - worst))
-        if len({len(column) for column in columns}) == 1:
-            scores[f"{cell[0]} / {cell[1]}"] = np.column_stack(columns)
+    """What arms do on several roads together, over the training seeds that they have on all of them.
+
+    Returns:
+      None for fewer than two roads, or fewer than two cells that they share.
+    """
+    roads = returns_by_road(folders)
+    scores = scores_of(roads) if len(roads) > 1 else {}
     if len(scores) < 2:
         return None
     figures.mkdir(parents=True, exist_ok=True)
-    plot_profiles(scores, figures, f"Performance profiles over {len(runs)} roads")
+    plot_profiles(scores, figures, f"Performance profiles over {len(roads)} roads")
     first, rng, rows = next(iter(scores)), np.random.default_rng(0), []
     for name, table in scores.items():
         middle = interquartile_mean(table, rng)
@@ -206,7 +225,7 @@ def across_roads(folders: Sequence[Path], figures: Path) -> Section | None:
     text = "Profiles: the share of runs (a seed on a road) whose return is above each value; a band is 95 % over seeds."
     return Section(
         "All roads together",
-        [f"{len(runs)} roads: {', '.join(folder.name for folder in runs)}."],
+        [f"{len(roads)} roads: {', '.join(roads)}."],
         [Table("roads", caption, pd.DataFrame(rows))],
         [Figure(text, figures / "profiles.png")],
     )

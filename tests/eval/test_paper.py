@@ -13,7 +13,7 @@ from result_tables import episodes_of
 from rss_shield.eval.metrics import summarise
 from rss_shield.eval.paper.command import run, write
 from rss_shield.eval.paper.compared import as_texts, comparisons
-from rss_shield.eval.paper.read import file_of
+from rss_shield.eval.paper.read import file_of, scores_of
 from rss_shield.eval.paper.render import escaped
 from rss_shield.eval.run_folder import versions
 
@@ -119,11 +119,29 @@ def test_the_report_says_what_came_out_and_needs_no_network(folder, tmp_path):
 
 
 def test_roads_together_have_profiles(folder, tmp_path):
-    another = tmp_path / "another"
+    same, another = tmp_path / "same", tmp_path / "another"
+    shutil.copytree(folder, same)
+    assert "All roads together" not in write((folder, same), tmp_path / "report", "One road, twice").read_text()
     shutil.copytree(folder, another)
+    record = json.loads((another / "config.json").read_text())
+    record["config"]["env_id"] = "merge-v0"
+    (another / "config.json").write_text(json.dumps(record))
+    rows = pd.read_csv(another / "episodes.csv", keep_default_na=False)
+    rows[rows["train_seed"] < 2].to_csv(another / "episodes.csv", index=False)
     page = write((folder, another), tmp_path / "report", "Two").read_text()
-    assert "All roads together" in page and "interquartile mean" in page
+    assert "2 roads: highway-fast-v0, merge-v0." in page and "interquartile mean" in page
     assert (tmp_path / "report" / "figures" / "roads" / "profiles.pdf").exists()
+
+
+def test_what_arms_do_on_several_roads_is_over_the_seeds_that_all_have(folder, tmp_path):
+    roads = {}
+    for road, seeds, scale in (("highway-fast-v0", [0, 1, 2], 1.0), ("merge-v0", [0, 1], 10.0)):
+        index = pd.MultiIndex.from_product([["a", "b"], ["on"], seeds], names=["train", "test", "train_seed"])
+        roads[road] = pd.Series(scale * np.array([*(1.0 for _ in seeds), *(3.0 for _ in seeds)]), index)
+    scores = scores_of(roads)
+    assert {name: table.tolist() for name, table in scores.items()} == {"a / on": [[0, 0]] * 2, "b / on": [[1, 1]] * 2}
+    flat = {road: 0.0 * returns for road, returns in roads.items()}
+    assert all(not table.any() for table in scores_of(flat).values())  # nothing tells them apart
 
 
 def test_what_is_no_run_is_refused_in_one_line(tmp_path, capsys):
