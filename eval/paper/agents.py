@@ -417,7 +417,7 @@ def write(runs: Sequence[Path], folder: Path) -> Path:
     legend = (
         "*Overridden*: frames in which a proper response changed the command; *change*: mean size of all changes of "
         f"the acceleration. *Flat*: the return of training episodes changed by at most {100 * FLAT:.0f} % from the "
-        "last fifth but one to the last."
+        "last fifth but one to the last, or between longer spans where too few episodes ended in these."
     )
     write_page(folder / PAGE, [HEADER, legend, *(part for road in roads for part in section_of(road, folder))])
     return folder / PAGE

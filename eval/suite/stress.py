@@ -26,6 +26,7 @@ from rss_shield.envs.roads.hostile import HOSTILE
 from rss_shield.eval.files import folder_for, refuse, write_json
 from rss_shield.eval.own import digests
 from rss_shield.eval.rollout import NO_CONTACT, evaluate
+from rss_shield.eval.run_folder import versions
 from rss_shield.eval.stats import clopper_pearson
 from rss_shield.eval.suite.assault import CONTINUOUS, FREE, POLICIES, STEERED, policy_of
 from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
@@ -38,6 +39,7 @@ from rss_shield.shield.verdicts import AT_FAULT, VERDICTS
 DEFAULT_ENVS = ("highway-fast-v0", "merge-v0", "exit-v0", "two-way-v0", "roundabout-v0", "intersection-v0")
 STOCK = "stock"  # the environment's own traffic
 SIDE_BY_SIDE = 512  # environments in the engine
+CODE = ("git_commit", "git_changes")  # of a block's versions
 BAD = (*AT_FAULT, "none")  # verdicts that a campaign stops at
 
 
@@ -218,14 +220,16 @@ def run(arguments: list[str] | None = None) -> None:
         folder_for(options.out)
     except ValueError as error:
         refuse("rss-shield stress", error)
-    results = []
+    results, now = [], versions()
+    older = 0
     for block in blocks_of(envs, policies, presets, options.shield, *numbers, traffic, options.judged):
         path = options.out / block.name
         if path.exists():
             result = json.loads(path.read_text(encoding="utf-8"))
+            older += any(result.get("versions", {}).get(name) != now[name] for name in CODE)
         else:
             try:
-                result = play(block, options.threads)
+                result = {**play(block, options.threads), "versions": now}
             except ValueError as error:
                 refuse("rss-shield stress", error)
             write_json(path, result)
@@ -234,6 +238,12 @@ def run(arguments: list[str] | None = None) -> None:
         if result["bad"] and not options.go_on:
             _stop(block, result, path, results)
     print(summary(results))
+    if older:
+        print(
+            f"rss-shield stress: warning: {older} of {len(results)} blocks were played by other code than this; in "
+            "another --out all are played again",
+            file=sys.stderr,
+        )
 
 
 def _check(env_id: str, policy: str, traffic: str, preset: str) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rss_shield.eval.files import write_text
+from rss_shield.eval.provenance import provenance
 from rss_shield.eval.rollout import NO_CONTACT
 from rss_shield.eval.stats import clopper_pearson
 from rss_shield.shield.verdicts import AT_FAULT, VERDICTS
@@ -72,7 +73,8 @@ def page_of(results: list[Result], command: str) -> str:
         "share of the time in which a duty changed the command.",
         "",
     ]
-    return "\n".join(lines)
+    foot = provenance(results)
+    return "\n".join([*lines, foot, ""] if foot else lines)
 
 
 def write_page(folder: Path, out: Path, command: str) -> None:

@@ -37,6 +37,13 @@ def test_a_campaign_that_was_stopped_goes_on(tmp_path, capsys, monkeypatch):
     assert played == [0, 8, 8, 16]
     assert files(parts) == files(whole)
     assert capsys.readouterr().out.splitlines()[-4:] == said
+    (first, *_) = sorted(parts.glob("*.json"))
+    record = json.loads(first.read_text())
+    first.write_text(json.dumps({**record, "versions": {**record["versions"], "git_commit": "0" * 40}}))
+    stress.run([*FEW, "--episodes", "24", "--out", str(parts)])
+    assert "1 of 3 blocks were played by other code than this" in capsys.readouterr().err
+    stress.run(["--out", str(parts), "--write", str(tmp_path)])
+    assert "Code 000000000000" in (tmp_path / "stress.md").read_text()
 
 
 def test_without_the_shield_it_stops_at_the_first_ego_at_fault(tmp_path, capsys):
