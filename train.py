@@ -1,5 +1,6 @@
 """Train agents with and without the RSS shield, test each with and without it, and report who crashes."""
 
+from rss_shield.eval.here import look_here
 from rss_shield.eval.interrupt import stop_on_interrupt
 
 if __name__ == "__main__":  # before all that takes its time
@@ -25,6 +26,7 @@ PROGRAM = "train.py" if __name__ == "__main__" else COMMAND  # as it was called
 
 
 def main(arguments: list[str]) -> None:
+    look_here()
     if "--list-arms" in arguments:
         print_arms()
         return

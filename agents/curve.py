@@ -20,7 +20,7 @@ COLUMNS = (
     "timesteps",  # decisions of all environments together when the episode ended or was cut off
     "started",  # ... and when it began
     "cut",  # 1: the block of training ended first; what the row says is how far the episode got
-    "return",  # sum of the environment's rewards, or of one's own; what a learner is charged is not in it
+    "return",  # sum of the environment's rewards, or of one's own; what an agent is charged is not in it
     "length",  # decisions
     "crashed",  # 1: the car touched somebody
     "blame",  # who broke their duty: ego, both, other, inherited, none, or NO_CONTACT

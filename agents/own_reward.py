@@ -1,5 +1,6 @@
 """A reward of one's own: what it is made of, and how an agent is paid by it."""
 
+import copy
 from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Any, NamedTuple
@@ -71,7 +72,9 @@ def rewards_by(
     """
     told = told_by(infos, ended)
     raw = np.asarray(told("raw_reward"), float)
-    paid = np.asarray(function(Decision(raw, np.asarray(actions), ended, told)), float)
+    # copies, all of them: a function may work in place
+    decision = Decision(raw.copy(), np.array(actions), ended.copy(), lambda *keys: copy.copy(told(*keys)))
+    paid = np.asarray(function(decision), float)
     name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', function)}"
     if paid.shape != raw.shape:
         raise RewardFailed(f"reward {name}: shape {paid.shape} for {len(raw)} environments; expected {raw.shape}")

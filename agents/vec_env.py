@@ -41,10 +41,10 @@ class VectorEnvAdapter(VecEnv):
             raise ValueError(f"autoreset_mode = {mode}: expected {self.autoreset_mode}")
         self.env = env
         self.charge = charge
-        # takes the place of the environment's rewards, before anything is charged; an episode's return is their sum
+        # takes the place of the environment's rewards, before anything is charged
         self.reward: Reward | None = None
         self.last_infos: dict = {}
-        self.earned = np.zeros(env.num_envs)  # by the last step, before anything is charged
+        self.earned = np.zeros(env.num_envs)  # by the last step, before anything is charged; their sum is a return
         self.ended = np.zeros(env.num_envs, bool)  # by the last step
         self.truncated = np.zeros(env.num_envs, bool)
         self._seed: int | None = None
@@ -54,7 +54,7 @@ class VectorEnvAdapter(VecEnv):
         observations, self.last_infos = self.env.reset(seed=self._seed)
         self._seed = None
         self.ended, self.truncated = np.zeros((2, self.num_envs), bool)
-        self._sums = np.zeros(self.num_envs)  # of rewards of one's own
+        self._sums = np.zeros(self.num_envs)  # of what was earned in the episode so far
         if self.charge is not None:
             self.charge.begin()
         self.reset_infos = [{} for _ in range(self.num_envs)]
@@ -72,21 +72,27 @@ class VectorEnvAdapter(VecEnv):
         observations, rewards, terminated, truncated, infos = self.env.step(self._actions)
         self.last_infos = infos
         self.ended, self.truncated = terminated | truncated, truncated & ~terminated
+        charged = self._charged_by_environment(rewards)
         if self.reward is not None:
             rewards = rewards_by(self.reward, rewards, self._actions, infos, self.ended)
-            self._sums += rewards
-        self.earned = np.asarray(rewards, float)
+        self.earned = rewards + charged
+        self._sums += self.earned
         nothing: dict = {}
         list_of_infos = [nothing] * self.num_envs
         for e in np.flatnonzero(self.ended).tolist():
             info = one(infos["final_info"], e)
             info["terminal_observation"] = infos["final_obs"][e]
             info["TimeLimit.truncated"] = bool(self.truncated[e])
-            if self.reward is not None:
-                info["episode"] = {**info["episode"], "r": self._sums[e]}
-                self._sums[e] = 0.0
+            info["episode"] = {**info["episode"], "r": self._sums[e]}
+            self._sums[e] = 0.0
             list_of_infos[e] = info
         return observations, self._charged(rewards), self.ended, list_of_infos
+
+    def _charged_by_environment(self, rewards: np.ndarray) -> np.ndarray | float:
+        """The intervention penalty that the environment has taken off its rewards, `[E]`."""
+        if "raw_reward" not in self.last_infos and "raw_reward" not in self.last_infos.get("final_info", {}):
+            return 0.0  # nobody watches
+        return np.asarray(self.told("raw_reward"), float) - rewards
 
     def _charged(self, rewards: np.ndarray) -> np.ndarray:
         rewards = np.array(rewards, np.float32)

@@ -1,5 +1,6 @@
 """highway-env's environments as they are, except that every episode ends and nothing is left behind in the process."""
 
+import importlib
 import warnings
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -97,7 +98,25 @@ def reward_names(env_id: str) -> set[str]:
     return set(info.get("rewards", ()))
 
 
+def _import_module_of(env_id: str) -> None:
+    """Of "module:my-road-v0" the module, which registers it.
+
+    Raises:
+      ValueError: it is not there, or fails when it is imported.
+    """
+    module, colon, _ = str(env_id).partition(":")
+    if not colon:
+        return
+    try:
+        importlib.import_module(module)
+    except Exception as error:
+        missing = isinstance(error, ModuleNotFoundError) and error.name and module.startswith(error.name)
+        said = f"no module {error.name!r} here, nor installed" if missing else f"{type(error).__name__}: {error}"  # type: ignore[attr-defined]
+        raise ValueError(f"env_id = {env_id!r}: {module} cannot be imported: {said}") from None
+
+
 def _made(env_id: str, arguments: dict[str, Any]) -> gym.Env:
+    _import_module_of(env_id)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*is out of date", DeprecationWarning)
         try:

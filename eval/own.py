@@ -40,7 +40,7 @@ def function_named(name: str) -> Callable[..., Any]:
     if not (module and function):
         raise ValueError(f"{name!r}: expected module:function")
     here = os.getcwd()
-    if here not in sys.path:
+    if sys.path[0] != here:
         sys.path.insert(0, here)  # and it stays there, for what the module imports later
     try:
         found = getattr(importlib.import_module(module), function)

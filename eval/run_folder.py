@@ -54,6 +54,8 @@ def open_run(
       ValueError: the folder is taken, or holds a run with another configuration (names the field).
     """
     record = folder / "config.json"
+    if (folder / "experiment.json").exists() and not record.exists():
+        raise ValueError(f"{folder} holds a sweep; --name chooses another folder")
     if folder.exists() and any(folder.iterdir()) and not resume:
         if not overwrite:
             raise ValueError(

@@ -3,6 +3,7 @@
 import importlib
 import sys
 
+from rss_shield.eval.here import look_here
 from rss_shield.eval.interrupt import stop_on_interrupt
 from rss_shield.experiment import expanded
 
@@ -30,6 +31,7 @@ def main(argv: list[str] | None = None) -> None:
     name, *rest = arguments
     if name not in COMMANDS:
         sys.exit(f"rss-shield: unknown command {name!r}; expected one of {', '.join(COMMANDS)}")
+    look_here()
     module, extra, _ = COMMANDS[name]
     # before all that takes its time
     resumes = "; nothing that is finished is lost, --resume goes on" if name == "train" else ""

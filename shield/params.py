@@ -39,7 +39,7 @@ class RSSParams(NamedTuple):
             if name not in fields:
                 raise ValueError(f"RSS parameter {name} is missing")
             try:
-                value = float(fields[name])
+                value = math.nan if isinstance(fields[name], bool) else float(fields[name])
             except (TypeError, ValueError):
                 raise ValueError(f"{name} = {fields[name]!r} is not a number") from None
             finite = not math.isnan(value) and (name == "v_cap" or not math.isinf(value))

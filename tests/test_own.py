@@ -206,9 +206,26 @@ def test_a_reward_of_ones_own_takes_the_place_of_the_environments_and_a_penalty_
         _, rewards, ended, infos = env.step(np.array([1, 0]))
         paid.append(rewards.tolist())
         returns += [infos[e]["episode"]["r"] for e in np.flatnonzero(ended)]
-    # decision k earns k + 10 k where the action is 1, else k; 1/4 less
+    # decision k earns k + 10 k where the action is 1, else k; the agent is paid 1/4 less
     assert paid == [[10.75, 0.75], [21.75, 1.75], [10.75, 2.75]]
-    assert returns == [32.5, 5.25]
+    assert returns == [33.0, 6.0]
+
+
+def test_a_reward_may_work_in_place():
+    def in_place(decision):
+        earned = decision.reward
+        earned *= 0.0
+        earned += 5.0
+        decision.told("speed")[:] = 0.0
+        decision.ended[:] = True
+        decision.actions[:] = 9
+        return earned
+
+    infos, ended, actions = {"raw_reward": np.ones(2), "speed": np.ones(2)}, np.zeros(2, bool), np.zeros(2, int)
+    paid = rewards_by(in_place, np.array([1.0, 0.75]), actions, infos, ended)
+    assert paid.tolist() == [5.0, 4.75]
+    assert infos["raw_reward"].tolist() == infos["speed"].tolist() == [1.0, 1.0]
+    assert not ended.any() and not actions.any()
 
 
 @pytest.mark.parametrize(
@@ -235,8 +252,8 @@ def test_an_agent_learns_from_it(tmp_path):
     curve = pd.read_csv(tmp_path / "model" / "learning_curve.csv")
     finished = curve[curve["cut"] == 0]
     assert set(finished["length"]) == {2, 3}
-    # 1 a decision, less the penalty; so it is where an episode is cut off
-    assert np.allclose(curve["return"], 0.75 * curve["length"])
+    # 1 a decision, and no penalty is in it; so it is where an episode is cut off
+    assert np.allclose(curve["return"], curve["length"])
 
 
 def test_tests_count_it_beside_the_return():

@@ -88,7 +88,7 @@ def compile_scenario(
         names it.
     """
     if env_id not in SCENARIOS:
-        raise Unsupported(f"env_id = {env_id!r}", f"one of {', '.join(SCENARIOS)}")
+        raise Unsupported(f"env_id = {env_id!r}", f"one of {', '.join(SCENARIOS)}, or backend 'highway-env'")
     scenario = SCENARIOS[env_id]
     asked = {} if config is None else config
     check_given(env_id, asked)

@@ -269,7 +269,13 @@ def checked_workers(workers: int) -> int:
 
 
 def _record(experiment: Experiment, folder: Path, file: str) -> list[str]:
-    """Write the experiment and the versions beside its results; says what changed since the first task."""
+    """Write the experiment and the versions beside its results; says what changed since the first task.
+
+    Raises:
+      ValueError: a run of another kind is there.
+    """
+    if (folder / "config.json").exists():
+        raise ValueError(f"{folder} holds a run of rss-shield train: expected an experiment of another name")
     path, now = folder / "experiment.json", json.loads(to_json(versions()))
     begun = path.exists() and any((folder / "tasks").glob("[!.]*"))
     before = json.loads(path.read_text(encoding="utf-8")) if begun else {"versions": now}

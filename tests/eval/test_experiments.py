@@ -174,6 +174,17 @@ def test_a_metric_that_the_episodes_have_not_is_said_after_the_first_and_not_aft
     assert len(list((tmp_path / "runs").glob("e/tasks/*/episodes.csv"))) == tasks
 
 
+def test_who_learns_nothing_is_tested_once_whatever_the_training_seeds(tmp_path, monkeypatch):
+    """Ten copies of the same episodes would make intervals far too narrow."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "sitting_driver.py").write_text("def drive(observations):\n    return None\n")
+    arms = ["lazy", "sitting_driver:drive", "shielded"]
+    tasks = tasks_of(experiment_of({"name": "x", "arms": arms, "seeds": [3, 4, 5]}))
+    seeds = {arm: [task.config["seed"] for task in tasks if task.config["arm"] == arm] for arm in arms}
+    assert seeds == {"lazy": [3], "sitting_driver:drive": [3], "shielded": [3, 4, 5]}
+
+
 def test_an_option_is_set_once():
     sweep = {"list": {"a": {"rules.memory": False}}, "grid": {"rules.memory": [True]}}
     with pytest.raises(ValueError, match=r"rules.memory is in sweep.list and varied as well"):

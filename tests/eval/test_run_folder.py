@@ -7,6 +7,8 @@ import pytest
 
 from rss_shield.eval.files import atomic, to_json, write_json
 from rss_shield.eval.run_folder import open_run, recorded
+from rss_shield.eval.runs.experiment import experiment_of
+from rss_shield.eval.suite.sweep import sweep
 
 CONFIG = {"env_id": "a-road", "seeds": (0, 1), "cap": float("inf")}
 
@@ -23,6 +25,16 @@ def test_a_taken_folder_is_refused_with_the_ways_out(tmp_path):
     open_run(tmp_path, CONFIG, resume=False, overwrite=False)
     with pytest.raises(ValueError, match="exists; --resume goes on with it, --overwrite"):
         open_run(tmp_path, CONFIG, resume=False, overwrite=False)
+
+
+def test_a_sweep_and_a_run_are_not_in_one_folder(tmp_path):
+    (tmp_path / "swept").mkdir()
+    (tmp_path / "swept" / "experiment.json").write_text("{}")
+    with pytest.raises(ValueError, match="swept holds a sweep; --name chooses another folder"):
+        open_run(tmp_path / "swept", {"seed": 0}, resume=True, overwrite=False)
+    open_run(tmp_path / "trained", {"seed": 0}, resume=False, overwrite=False)
+    with pytest.raises(ValueError, match="trained holds a run of rss-shield train"):
+        sweep(experiment_of({"name": "trained", "policies": ["idle"]}), tmp_path / "trained")
 
 
 def test_a_run_goes_on_with_the_same_configuration(tmp_path):

@@ -258,6 +258,17 @@ def test_in_other_steps_nobody_is_where_the_log_does_not_have_them(tmp_path, dt,
         np.testing.assert_allclose(users.speed[inside, i], 30.0, atol=1e-2)
 
 
+def test_nothing_that_is_read_is_overwritten_and_nothing_written_twice(tmp_path, capsys):
+    path = written(rows(t=TIME, x=X, y=Y), tmp_path)
+    before = path.read_bytes()
+    assert f"{path} would be overwritten" in refused(capsys, "judge", str(path), "--out", str(tmp_path))
+    (tmp_path / "b").mkdir()
+    another = written(rows(t=TIME, x=X, y=Y), tmp_path / "b")
+    said = refused(capsys, "judge", str(path), str(another), "--out", str(tmp_path / "out"))
+    assert "2 files are called log" in said
+    assert path.read_bytes() == before and not (tmp_path / "out").exists()
+
+
 def test_options_of_csv_files_are_for_these_only(capsys):
     assert "--dt 0.1: expected with .csv files only; a.npz" in refused(capsys, "judge", "a.npz", "--dt", "0.1")
 

@@ -72,6 +72,11 @@ def test_what_is_not_a_number_is_named_with_its_value(value):
     assert f"a_min_brake = {value!r} is not a number" in str(error.value)
 
 
+def test_a_truth_value_is_no_number():
+    with pytest.raises(ValueError, match="a_min_brake = True is out of range: expected a finite number"):
+        RSSParams.validated(**(GOOD | {"a_min_brake": True}))
+
+
 def test_nobody_brakes_weaker_than_the_hardest_braking_allows():
     with pytest.raises(ValueError, match=r"^a_min_brake = 9 .* at most a_max_brake = 8$"):
         RSSParams.validated(**(GOOD | {"a_min_brake": 9.0}))

@@ -33,6 +33,7 @@ def run(arguments: list[str] | None = None) -> None:
         for path, trace in zip(options.files, traces, strict=True):
             _check_users(path, trace, options)
         if options.out is not None:
+            _check_outputs(options.files, options.out)
             folder_for(options.out)
         for path, trace in zip(options.files, traces, strict=True):
             _judge(path, trace, options)
@@ -93,6 +94,23 @@ def _check(options: argparse.Namespace) -> None:
         raise ValueError(
             f"{option} {getattr(options, given[0])}: expected with .csv files only; {other} says it itself"
         )
+
+
+def _check_outputs(files: list[Path], out: Path) -> None:
+    """Is every file that will be written another one, and none of those that are read?
+
+    Raises:
+      ValueError: names a file that would be lost.
+    """
+    stems = [path.stem for path in files]
+    twice = next((path for path in files if stems.count(path.stem) > 1), None)
+    if twice is not None:
+        raise ValueError(f"{twice}: {stems.count(twice.stem)} files are called {twice.stem}, and so is what is written")
+    read_ones = {path.resolve(): path for path in files}
+    for stem in stems:
+        lost = read_ones.get((out / f"{stem}.csv").resolve()) or read_ones.get((out / f"{stem}-risk.csv").resolve())
+        if lost is not None:
+            raise ValueError(f"--out {out}: {lost} would be overwritten; expected another folder")
 
 
 def _check_users(path: Path, trace: Trace, options: argparse.Namespace) -> None:
