@@ -131,7 +131,8 @@ def estimate(cell: pd.DataFrame, metric: str) -> Interval:
     if len(seeds) > 1:
         over = cluster_bootstrap(seeds, np.random.default_rng(0))
     else:
-        mean, half = float(pooled.mean()), 1.96 * float(pooled.std(ddof=1)) / np.sqrt(pooled.size)
+        mean = float(pooled.mean())
+        half = 1.96 * float(pooled.std(ddof=1)) / np.sqrt(pooled.size) if pooled.size > 1 else np.nan
         over = Interval(mean, mean - half, mean + half, pooled.size)
     if metric in RATES:
         exact = clopper_pearson(int(pooled.sum()), pooled.size)
@@ -148,7 +149,8 @@ def per_decision(cell: pd.DataFrame, what: str) -> Interval:
     for _, rows in cell.groupby("train_seed"):
         ratio = rows[what].sum() / rows["length"].sum()
         shares.append(rows.assign(share=ratio + (rows[what] - ratio * rows["length"]) / rows["length"].mean()))
-    return estimate(pd.concat(shares), "share")
+    found = estimate(pd.concat(shares), "share")
+    return found._replace(low=max(found.low, 0.0))
 
 
 def against(cell: pd.DataFrame, baseline: pd.DataFrame, metric: str = "return") -> Interval:
@@ -195,7 +197,7 @@ def percent(interval: Interval, digits: int = 1) -> str:
 
 def number(interval: Interval, digits: int = 1, sign: str = "") -> str:
     low, value, high = (f"{bound:{sign}.{digits}f}" for bound in (interval.low, interval.value, interval.high))
-    return f"{value} [{low}, {high}]"
+    return f"{value} [–]" if np.isnan(interval.low) else f"{value} [{low}, {high}]"
 
 
 def row_of(arm: Arm, road: Road, cells: dict[tuple[str, str], pd.DataFrame]) -> list[str]:
@@ -291,9 +293,9 @@ def questions(road: Road, cells: dict[tuple[str, str], pd.DataFrame]) -> str:
     lines = [
         f"Overridden in at most {100 * SELDOM:.0f} % of the frames with at least {100 * (1 - NEARLY):.0f} % of the "
         f"best return behind the shield ({best:.1f}): {', '.join(asleep) or 'nobody'}.",
-        f"Crashes in at most {100 * HARMLESS:.0f} % of the episodes without the shield: "
-        f"{', '.join(harmless) or 'nobody'}."
-        + (f" So do these, which earn less than half of the best: {', '.join(useless)}." if useless else ""),
+        f"Crashes in at most {100 * HARMLESS:.0f} % of the episodes without the shield and earns at least "
+        f"{100 * WORTHWHILE:.0f} % of the best return: {', '.join(harmless) or 'nobody'}."
+        + (f" Crashes as seldom and earns less: {', '.join(useless)}." if useless else ""),
     ]
     lines += sentences_on_costs(road.prices[road.prices["arm"] == "ppo-lagrangian"], cells)
     return "\n".join(f"- {line}" for line in lines)

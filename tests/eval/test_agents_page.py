@@ -128,6 +128,11 @@ def test_what_is_counted_per_decision_is_a_ratio_of_sums():
     assert (found.low, found.high) == pytest.approx((6 / 80 - half, 6 / 80 + half))
 
 
+def test_of_one_value_there_is_no_interval():
+    cell = pd.DataFrame({"train_seed": [0], "time_to_goal": [13.0]})
+    assert agents.number(agents.estimate(cell, "time_to_goal")) == "13.0 [–]"
+
+
 def test_an_agent_that_pays_more_than_any_limit_is_said_not_to_meet_it():
     prices = pd.DataFrame({"timesteps": [100], "measured": 0.3, "target": 0.01, "multiplier": 2.0, "train_seed": 0})
     cells = {
@@ -157,7 +162,7 @@ def test_who_leaves_the_road_is_not_called_harmless_without_what_it_earns(runs):
             1
         ]
         assert ("nobody" not in said) == named and f"return {earned:.1f})" in said
-        assert ("which earn less than half of the best" in said) != named
+        assert ("Crashes as seldom and earns less" in said) != named
 
 
 def test_agents_behind_other_filters_have_a_table(runs):
