@@ -21,7 +21,7 @@ from rss_shield.eval.paper.section import Figure, Section, Table
 from rss_shield.eval.plots import plot_blame, plot_learning_curve, save
 from rss_shield.eval.run_folder import filmstrips_of, pages_of
 from rss_shield.eval.runs.points import groups_of, with_front
-from rss_shield.eval.runs.tables import plot_front, shown_metrics, texts, wide
+from rss_shield.eval.runs.tables import intervals_of, plot_front, shown_metrics, texts, wide
 from rss_shield.eval.stats import Interval, interquartile_mean, probability_of_improvement
 from rss_shield.eval.table import legend, table_frame
 
@@ -128,8 +128,7 @@ def _of_sweep(folder: Path, figures: Path) -> Section:
     table = with_front(wide(points, axes), safety, performance)
     figure = plot_front(table, axes, safety, performance, experiment["name"])
     save(figure, figures / "pareto")
-    over = ", ".join(sorted(set(points["over"])))
-    caption = f"Points of the sweep; [low, high]: 95 % intervals over {over}; ★: on the Pareto front of its panel."
+    caption = f"Points of the sweep. {intervals_of(points)}; ★: on the Pareto front of its panel."
     inner = [name for name in axes if name not in ("environment", "policy", "test")]
     groups = [(label, rows.tolist()) for label, rows in groups_of(table)]
     return Section(
@@ -206,10 +205,10 @@ def across_roads(folders: Sequence[Path], figures: Path) -> Section | None:
         return None
     figures.mkdir(parents=True, exist_ok=True)
     plot_profiles(scores, figures, f"Performance profiles over {len(roads)} roads")
-    first, rng, rows = next(iter(scores)), np.random.default_rng(0), []
+    first, rows = next(iter(scores)), []
     for name, table in scores.items():
-        middle = interquartile_mean(table, rng)
-        better = probability_of_improvement(table, scores[first], rng)
+        middle = interquartile_mean(table, np.random.default_rng(0))
+        better = probability_of_improvement(table, scores[first], np.random.default_rng(0))
         rows.append(
             {
                 "train / test": name,

@@ -75,9 +75,8 @@ def write_points(folder: Path, points: pd.DataFrame, axes: list[str], safety: st
     with atomic(folder / "points.csv") as temporary:
         points.to_csv(temporary, index=False)
     text = markdown_of(texts(table, axes, shown_metrics(table, safety, performance)))
-    over = ", ".join(sorted(set(points["over"])))
     note = (
-        f"[low, high]: 95 % intervals over {over}; ★: no other point of its panel is as good in both "
+        f"{intervals_of(points)}; ★: no other point of its panel is as good in both "
         f"{metric_named(safety).label} and {metric_named(performance).label} and better in one."
     )
     write_text(folder / "table.md", f"{title}\n\n{text}\n\n{note}\n")
@@ -86,6 +85,12 @@ def write_points(folder: Path, points: pd.DataFrame, axes: list[str], safety: st
         with atomic(folder / f"pareto.{kind}") as temporary:
             figure.savefig(temporary, format=kind, metadata={"CreationDate": None} if kind == "pdf" else None)
     return text
+
+
+def intervals_of(points: pd.DataFrame) -> str:
+    """What values and their intervals are about."""
+    over = ", ".join(sorted(set(points["over"])))
+    return f"Means (min TTC and the like: medians) of episodes of all seeds; [low, high]: 95 % intervals over {over}"
 
 
 def plot_front(table: pd.DataFrame, axes: list[str], safety: str, performance: str, title: str) -> Figure:

@@ -78,6 +78,13 @@ def test_differences_are_paired_tested_and_corrected():
     assert "-55.0 [" in as_texts(comparisons(episodes()))["value [low, high]"][0]
 
 
+def test_equal_outcomes_differ_by_equal_intervals():
+    blames = {"off": ["ego"] * 12 + [""] * 8, "on": ["ego"] * 3 + [""] * 17}
+    frames = [episodes_of(blame, test, "on").assign(train_seed=k) for test, blame in blames.items() for k in range(3)]
+    rows = comparisons(pd.concat(frames, ignore_index=True)).set_index("metric")
+    assert rows.loc["crash", ["low", "high"]].equals(rows.loc["at_fault", ["low", "high"]])
+
+
 def test_who_learns_nothing_is_compared_with_every_seed():
     frame = episodes()
     scripted = episodes_of([""] * 20, "lazy", "on")
