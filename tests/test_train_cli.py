@@ -198,7 +198,8 @@ def test_a_run_prints_one_table_and_where_everything_is(finished):
     folder, output = finished
     assert " ".join(output.split()).count("95 % interval") == 1
     assert "Traceback" not in output
-    assert f"Everything is in {folder}" in output
+    named = output.split(f"Everything is in {folder}: ")[1].split("\n")[0].split(", ")
+    assert "learning_curve.png" in named and all((folder / name).exists() for name in named)
 
 
 def test_a_run_writes_everything_a_paper_needs(finished):

@@ -19,6 +19,7 @@ from rss_shield.eval.paper.compared import as_texts, comparisons
 from rss_shield.eval.paper.figures import plot_comfort, plot_profiles
 from rss_shield.eval.paper.section import Figure, Section, Table
 from rss_shield.eval.plots import plot_blame, plot_learning_curve, save
+from rss_shield.eval.report import title_of
 from rss_shield.eval.run_folder import filmstrips_of, pages_of
 from rss_shield.eval.runs.points import groups_of, with_front
 from rss_shield.eval.runs.tables import intervals_of, plot_front, shown_metrics, texts, wide
@@ -62,7 +63,8 @@ def section_of(folder: Path, figures: Path) -> Section:
 
 
 def _of_run(folder: Path, figures: Path) -> Section:
-    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
+    record = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    config = record["config"]
     episodes = read_episodes(folder)
     summary, compared = summarise(episodes), comparisons(episodes)
     frame = table_frame(summary)
@@ -82,11 +84,11 @@ def _of_run(folder: Path, figures: Path) -> Section:
         )
     return Section(
         folder.name if folder.name == config["env_id"] else f"{config['env_id']} ({folder.name})",
-        words.of_run(episodes, summary, compared),
+        [f"{title_of(config)}.", *words.of_run(episodes, summary, compared)],
         tables,
         list(_figures_of_run(folder, figures, config, episodes, summary)),
         legend(summary),
-        command(config),
+        command(record),
         pages_of(folder),
     )
 

@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from rss_shield.eval.arms import arm_called
 from rss_shield.eval.metrics import with_outcomes
 from rss_shield.eval.runs.points import metric_named
 from rss_shield.eval.stats import clopper_pearson
@@ -16,11 +17,10 @@ def of_run(episodes: pd.DataFrame, summary: pd.DataFrame, compared: pd.DataFrame
       compared: as of `eval.paper.compared.comparisons`.
     """
     outcomes = with_outcomes(episodes)
-    seeds, cells = episodes["train_seed"].nunique(), summary[["train", "test"]].drop_duplicates()
-    paragraphs = [
-        f"{len(cells)} cells (an arm, tested one way), {len(episodes)} test episodes, {seeds} training "
-        f"seed{'s' if seeds > 1 else ''}."
-    ]
+    cells = summary[["train", "test"]].drop_duplicates()
+    seeds = episodes.loc[~episodes["train"].map(_is_scripted), "train_seed"].nunique()
+    over = f", {seeds} training seed{'s' if seeds > 1 else ''}" if seeds else ""
+    paragraphs = [f"{len(cells)} cells (an arm, tested one way), {len(episodes)} test episodes{over}."]
     for test, where in (("on", "with the shield on"), ("off", "with the shield off")):
         tested = outcomes[outcomes["test"] == test]
         if len(tested):
@@ -49,6 +49,11 @@ def of_run(episodes: pd.DataFrame, summary: pd.DataFrame, compared: pd.DataFrame
             "chance (McNemar, p < 0.05 after Holm's correction; over episodes of these models, not over seeds)."
         )
     return paragraphs
+
+
+def _is_scripted(train: str) -> bool:
+    arm = arm_called(train)
+    return arm is not None and arm.scripted
 
 
 def _faults(tested: pd.DataFrame, where: str) -> str:

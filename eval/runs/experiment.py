@@ -1,13 +1,12 @@
 """An experiment is a file that names environments, arms or policies, seeds, budgets, tests, and what is varied."""
 
-import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rss_shield.eval.config_option import read_config
+from rss_shield.eval.config_option import as_text, read_config
 from rss_shield.eval.runs.names import check_names, flat
 
 DIRECTIONS = ("minimize", "maximize")
@@ -139,8 +138,8 @@ def as_words(options: Mapping[str, Any]) -> list[str]:
     words = []
     for name, value in options.items():
         flag = name.replace("_", "-")
-        if name.startswith(("config.", "hyperparameters.")) and not isinstance(value, str):
-            words += [f"--{flag}", json.dumps(value)]
+        if isinstance(value, dict) or name.startswith(("config.", "hyperparameters.")):
+            words += [f"--{flag}", as_text(value)]
             continue
         if isinstance(value, bool) and not name.startswith("rules."):
             words.append(f"--{flag}" if value else f"--no-{flag}")

@@ -38,6 +38,7 @@ def folder(tmp_path):
     config = {
         "env_id": "highway-fast-v0",
         "arms": ["unshielded", "shielded"],
+        "rules": {"memory": False},
         "seeds": [0, 1, 2],
         "total_timesteps": 1000,
         "parameters": {},
@@ -114,6 +115,8 @@ def test_the_report_says_what_came_out_and_needs_no_network(folder, tmp_path):
     summary = summarise(episodes()).set_index(["train", "test", "metric"])["value"]
     best = summary.xs("return", level="metric").max()
     assert f"Highest return: trained with the shield, tested with it on, {best:.1f} per episode." in page
+    assert "PPO on highway-fast-v0, RSS preset auto (rules.memory False), 1000 timesteps per arm, no interv" in page
+    assert "rss-shield train --env-id highway-fast-v0 --total-timesteps 1000 --seeds 0 1 2" in page
     assert not re.search(r"(src|href)=\"(?!data:|#)", page)
     assert page.count("<img ") == page.count("data:image/png;base64,") == 4
     markdown = (tmp_path / "report" / "report.md").read_text()
