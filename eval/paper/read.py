@@ -1,6 +1,8 @@
 """Runs and sweeps as sections of a report."""
 
 import json
+import os
+import shlex
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +13,7 @@ import pandas as pd
 
 from rss_shield.eval import removal
 from rss_shield.eval.arms import arm_called
+from rss_shield.eval.files import linked_names
 from rss_shield.eval.frontier import plot_frontier
 from rss_shield.eval.metrics import summarise, with_outcomes
 from rss_shield.eval.pages import command
@@ -48,11 +51,12 @@ def section_of(folder: Path, figures: Path) -> Section:
 
     Args:
       folder: of results.
-      figures: folder that its figures are drawn into.
+      figures: folder that its figures are drawn into; its name heads the labels of tables.
 
     Raises:
       ValueError: neither of both, or not finished.
     """
+    folder = Path(os.path.abspath(folder))  # which has a name, unlike .
     figures.mkdir(parents=True, exist_ok=True)
     if (folder / "experiment.json").exists() and (folder / "points.csv").exists():
         return _of_sweep(folder, figures)
@@ -69,14 +73,14 @@ def _of_run(folder: Path, figures: Path) -> Section:
     summary, compared = summarise(episodes), comparisons(episodes)
     frame = table_frame(summary)
     tables = [
-        Table(f"{folder.name}-{name.split()[0].lower()}", f"{name}. {INTERVALS}", turned(frame, headings))
+        Table(f"{figures.name}-{name.split()[0].lower()}", f"{name}. {INTERVALS}", turned(frame, headings))
         for name, headings in GROUPS.items()
         if any(heading.split(" [")[0] in headings for heading in frame.columns)
     ]
     if len(compared):
         tables.append(
             Table(
-                f"{folder.name}-compared",
+                f"{figures.name}-compared",
                 "Differences to the first cell, paired by seed and test episode. only here / only first: episodes "
                 "in which one of both had the outcome.",
                 as_texts(compared),
@@ -115,10 +119,11 @@ def _figures_of_run(folder: Path, figures: Path, config: dict[str, Any], episode
     if plot_comfort(summary, figures, road):
         yield Figure("How the ride feels.", figures / "comfort.png")
     for strip in filmstrips_of(folder):
+        (name,) = linked_names([strip.stem])
         for suffix in (".png", ".pdf"):
-            shutil.copyfile(strip.with_suffix(suffix), figures / f"{strip.stem}{suffix}")
+            shutil.copyfile(strip.with_suffix(suffix), figures / f"{name}{suffix}")
         text = f"{strip.stem}: five moments from above (the ego blue, who it was about red), and the margins over time."
-        yield Figure(text, figures / strip.name)
+        yield Figure(text, figures / f"{name}.png")
 
 
 def _of_sweep(folder: Path, figures: Path) -> Section:
@@ -136,15 +141,20 @@ def _of_sweep(folder: Path, figures: Path) -> Section:
     return Section(
         f"Sweep {experiment['name']}",
         [experiment["about"], *words.of_sweep(table, inner, groups, safety, performance)],
-        [Table(experiment["name"], caption, texts(table, axes, shown_metrics(table, safety, performance)))],
+        [Table(figures.name, caption, texts(table, axes, shown_metrics(table, safety, performance)))],
         [
             Figure(
                 f"Safety and performance: {safety} against {performance}, with the Pareto front.",
                 figures / "pareto.png",
             )
         ],
-        command=f"rss-shield sweep {file_of(record)}",
+        command=sweep_command(record),
     )
+
+
+def sweep_command(record: dict[str, Any]) -> str:
+    """The command line that makes a sweep again."""
+    return shlex.join(["rss-shield", "sweep", file_of(record), *record.get("options", [])])
 
 
 def file_of(record: dict[str, Any]) -> str:

@@ -13,10 +13,10 @@ from typing import Any
 
 import pandas as pd
 
-from rss_shield.eval.files import atomic
+from rss_shield.eval.files import atomic, linked_names
 from rss_shield.eval.pages import write_page
 from rss_shield.eval.paper import words
-from rss_shield.eval.paper.read import file_of
+from rss_shield.eval.paper.read import file_of, sweep_command
 from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.runs.points import APART, groups_of, with_front
 from rss_shield.eval.runs.tables import markdown_of, plot_front, shown_metrics, texts, wide
@@ -47,7 +47,8 @@ def section_of(folder: Path, out: Path) -> list[str]:
     table = with_front(wide(points, axes), safety, performance)
     groups = [(label, rows.tolist()) for label, rows in groups_of(table)]
     inner = [name for name in axes if name not in APART]
-    picture = out / f"sweeps-{experiment['name']}.png"
+    (name,) = linked_names([f"sweeps-{experiment['name']}"])
+    picture = out / f"{name}.png"
     with atomic(picture) as temporary:
         plot_front(table, axes, safety, performance, experiment["name"]).savefig(temporary, format="png")
     sentences = words.of_sweep(table, inner, groups, safety, performance)
@@ -59,7 +60,7 @@ def section_of(folder: Path, out: Path) -> list[str]:
         "\n".join(f"- {sentence}" for sentence in sentences),
         f"![Safety and performance of {experiment['name']}]({picture.name})",
         markdown_of(texts(table, axes, shown_metrics(table, safety, performance))),
-        f"```sh\nrss-shield sweep {file_of(record)}\n```",
+        f"```sh\n{sweep_command(record)}\n```",
         provenance([record]),
     ]
 

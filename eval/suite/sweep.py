@@ -11,7 +11,7 @@ same command goes on. Results do not depend on backend and workers.
 import io
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -24,7 +24,7 @@ from rss_shield.eval.metrics import with_outcomes
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.run_folder import versions
 from rss_shield.eval.runs.backends import Outcome, Work, run_tasks
-from rss_shield.eval.runs.experiment import Experiment, read_experiment
+from rss_shield.eval.runs.experiment import Experiment, as_words, read_experiment
 from rss_shield.eval.runs.points import check_there, metric_named, point_row
 from rss_shield.eval.runs.store import ERROR, Files, Store
 from rss_shield.eval.runs.tables import write_points
@@ -214,11 +214,13 @@ def check_tasks(tasks: list[Task]) -> None:
             check_played(task.config["environment"], task.config["policy"], task.config["options"])
 
 
-def sweep(experiment: Experiment, folder: Path, work: Work = do_task, file: str = "", **run: Any) -> Sweep:
+def sweep(
+    experiment: Experiment, folder: Path, work: Work = do_task, file: str = "", options: Sequence[str] = (), **run: Any
+) -> Sweep:
     """Run an experiment and write its points.
 
     Args:
-      file: the experiment's own, which pages name to do it again.
+      file, options: of the command line that asked for it, which pages print to do it again.
       run: backend, workers and address of `run_tasks`.
 
     Raises:
@@ -227,7 +229,7 @@ def sweep(experiment: Experiment, folder: Path, work: Work = do_task, file: str 
     for name in metrics_of(experiment):
         metric_named(name)
     folder.mkdir(parents=True, exist_ok=True)
-    for warning in _record(experiment, folder, file):
+    for warning in _record(experiment, folder, {"file": file, "options": list(options)}):
         print(f"rss-shield sweep: warning: {warning}", file=sys.stderr)
     under_way = Sweep(experiment, folder, work, **run)
     under_way.run()
@@ -268,12 +270,12 @@ def checked_workers(workers: int) -> int:
     return workers
 
 
-def _record(experiment: Experiment, folder: Path, file: str) -> list[str]:
+def _record(experiment: Experiment, folder: Path, asked: Mapping[str, Any]) -> list[str]:
     """Write the experiment and the versions beside its results; says what changed since the first task."""
     path, now = folder / "experiment.json", json.loads(to_json(versions()))
     begun = path.exists() and any((folder / "tasks").glob("[!.]*"))
     before = json.loads(path.read_text(encoding="utf-8")) if begun else {"versions": now}
-    write_json(path, {"experiment": asdict(experiment), "file": file, "versions": before["versions"]})
+    write_json(path, {"experiment": asdict(experiment), **asked, "versions": before["versions"]})
     changed = [name for name in now if name in before["versions"] and now[name] != before["versions"][name]]
     return [
         f"{name} is not what it was when the first task of {folder} ran: remove the folder to run all anew"
@@ -285,11 +287,13 @@ def run(arguments: list[str]) -> None:
     """What a command line asks for."""
     given = tyro.cli(Arguments, prog="rss-shield sweep", description=__doc__, args=arguments)
     try:
-        experiment = with_budget(read_experiment(given.experiment), given.episodes, given.total_timesteps)
+        budget = {"episodes": given.episodes, "total_timesteps": given.total_timesteps}
+        experiment = with_budget(read_experiment(given.experiment), **budget)
         done = sweep(
             experiment,
             given.runs_dir / experiment.name,
             file=str(given.experiment),
+            options=as_words({name: value for name, value in budget.items() if value is not None}),
             backend=given.backend,
             workers=checked_workers(given.workers),
             address=given.address,

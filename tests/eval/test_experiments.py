@@ -194,6 +194,19 @@ def test_samples_are_in_their_ranges_and_the_same_again():
 
 
 @pytest.mark.parametrize(
+    ("given", "name"),
+    [("mein versuch (2)", "mein-versuch-2"), ("mein/versuch: 2", "mein-versuch-2"), ("größer 2.1", "größer-2.1")],
+)
+def test_a_name_is_made_one_that_a_folder_may_have(given, name):
+    assert experiment_of(LEAST | {"name": given}).name == name
+
+
+def test_a_name_of_no_letters_is_refused():
+    with pytest.raises(ValueError, match=r"name = ' - ': expected letters, digits and"):
+        experiment_of(LEAST | {"name": " - "})
+
+
+@pytest.mark.parametrize(
     ("name", "text"),
     [
         ("e.yaml", "policies: [idle]\nsweep: {grid: {rules.memory: [true, false]}}\n"),

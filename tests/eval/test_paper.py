@@ -3,6 +3,8 @@
 import json
 import re
 import shutil
+from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,7 @@ from result_tables import episodes_of
 from rss_shield.eval.metrics import summarise
 from rss_shield.eval.paper.command import run, write
 from rss_shield.eval.paper.compared import as_texts, comparisons
-from rss_shield.eval.paper.read import file_of, scores_of
+from rss_shield.eval.paper.read import file_of, scores_of, sweep_command
 from rss_shield.eval.paper.render import escaped
 from rss_shield.eval.run_folder import versions
 
@@ -128,6 +130,27 @@ def test_the_report_says_what_came_out_and_needs_no_network(folder, tmp_path):
     assert latex.count(r"\begin{tabular}") == latex.count(r"\end{tabular}") == 4
 
 
+def test_links_are_valid_whatever_folders_are_called(folder, tmp_path, monkeypatch):
+    runs = [tmp_path / "mein versuch (ä_1)", tmp_path / "b" / "mein versuch (ä_1)", tmp_path / "roads"]
+    for copy in runs:
+        shutil.copytree(folder, copy)
+        (copy / "pages").mkdir()
+        (copy / "pages" / "my drive-worst.html").write_text("")
+    monkeypatch.chdir(runs[0])
+    out = tmp_path / "a report"
+    page = write((Path("."), *runs[1:]), out, "Odd names").read_text()
+    markdown, latex = (out / "report.md").read_text(), (out / "report.tex").read_text()
+    links = re.findall(r"\]\((.*?)\)", markdown)
+    assert all(re.fullmatch(r"[\w.%/-]+", link, re.ASCII) and (out / unquote(link)).exists() for link in links)
+    assert len(links) == len(set(links)) == 3 * (4 + 1)
+    assert all((out / unquote(link)).exists() for link in re.findall(r'<a href="([^#].*?)"', page))
+    paths = re.findall(r"\\includegraphics\[.*?\]\{(.*?)\}", latex)
+    assert len(paths) == 12 and all((out / path).exists() for path in paths)
+    labels = re.findall(r"\\label\{(.*?)\}", latex)
+    assert len(labels) == len(set(labels)) and all(re.fullmatch(r"[\w:./-]+", label, re.ASCII) for label in labels)
+    assert "## highway-fast-v0 (mein versuch (ä_1))" in markdown
+
+
 def test_roads_together_have_profiles(folder, tmp_path):
     same, another = tmp_path / "same", tmp_path / "another"
     shutil.copytree(folder, same)
@@ -172,10 +195,13 @@ def test_the_file_of_a_sweep_is_that_which_was_called(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     record = {"experiment": {"name": "pol"}}
     assert file_of(record) == "pol.yaml" and file_of({**record, "file": "mine/pol.toml"}) == "mine/pol.toml"
+    asked = {**record, "file": "mein versuch.yaml", "options": ["--episodes", "20"]}
+    assert sweep_command(asked) == "rss-shield sweep 'mein versuch.yaml' --episodes 20"
 
 
 def test_latex_takes_every_sign():
     assert escaped("50 % of a_b & c – ★ m/s²") == r"50 \% of a\_b \& c -- $\star$ m/s$^2$"
+    assert escaped("~/a^b") == r"\textasciitilde{}/a\textasciicircum{}b"
 
 
 BROWSER = next(
