@@ -63,11 +63,11 @@ def footer(runs: tuple[Path, ...]) -> str:
         for record in records_of([run]):
             versions = record.get("versions", record)
             packages = ", ".join(f"{package} {version}" for package, version in versions["packages"].items() if version)
-            code = f"{versions['git_commit']}{' with changes' if versions['git_changes'] else ''}"
+            changed = " with changes" if versions["git_changes"] else ""
+            code = f"code {versions['git_commit']}{changed}" if versions["git_commit"] else "code without a commit"
             cores = f", {versions['cores']} cores" if "cores" in versions else ""
             lines += [
-                f"{_name(run)}: code {code}; Python {versions['python']}; {versions['platform']}; "
-                f"{versions['cpu']}{cores}",
+                f"{_name(run)}: {code}; Python {versions['python']}; {versions['platform']}; {versions['cpu']}{cores}",
                 f"  {packages}",
             ]
     return "\n".join(lines)

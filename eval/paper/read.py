@@ -24,7 +24,8 @@ from rss_shield.eval.paper.section import Figure, Section, Table
 from rss_shield.eval.plots import plot_blame, plot_learning_curve, save
 from rss_shield.eval.report import title_of
 from rss_shield.eval.run_folder import filmstrips_of, pages_of
-from rss_shield.eval.runs.points import groups_of, with_front
+from rss_shield.eval.runs.points import groups_of, metric_named, with_front
+from rss_shield.eval.runs.store import missing_in
 from rss_shield.eval.runs.tables import intervals_of, plot_front, shown_metrics, texts, wide
 from rss_shield.eval.stats import Interval, interquartile_mean, probability_of_improvement
 from rss_shield.eval.table import legend, table_frame
@@ -140,11 +141,12 @@ def _of_sweep(folder: Path, figures: Path) -> Section:
     groups = [(label, rows.tolist()) for label, rows in groups_of(table)]
     return Section(
         f"Sweep {experiment['name']}",
-        [experiment["about"], *words.of_sweep(table, inner, groups, safety, performance)],
+        [experiment["about"], *words.of_sweep(table, inner, groups, safety, performance), missing_in(folder)],
         [Table(figures.name, caption, texts(table, axes, shown_metrics(table, safety, performance)))],
         [
             Figure(
-                f"Safety and performance: {safety} against {performance}, with the Pareto front.",
+                f"Safety and performance: {metric_named(safety).label} against {metric_named(performance).label}, with "
+                "the Pareto front.",
                 figures / "pareto.png",
             )
         ],

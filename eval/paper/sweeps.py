@@ -19,6 +19,7 @@ from rss_shield.eval.paper import words
 from rss_shield.eval.paper.read import file_of, sweep_command
 from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.runs.points import APART, groups_of, with_front
+from rss_shield.eval.runs.store import missing_in
 from rss_shield.eval.runs.tables import markdown_of, plot_front, shown_metrics, texts, wide
 
 PAGE = "sweeps.md"
@@ -51,13 +52,13 @@ def section_of(folder: Path, out: Path) -> list[str]:
     picture = out / f"{name}.png"
     with atomic(picture) as temporary:
         plot_front(table, axes, safety, performance, experiment["name"]).savefig(temporary, format="png")
-    sentences = words.of_sweep(table, inner, groups, safety, performance)
+    sentences = [*words.of_sweep(table, inner, groups, safety, performance), missing_in(folder)]
     fixed = experiment["options"]
     return [
         f"## `{file_of(record)}`",
         experiment["about"],
         played(experiment) + (f"; all with {json.dumps(fixed)}." if fixed else "."),
-        "\n".join(f"- {sentence}" for sentence in sentences),
+        "\n".join(f"- {sentence}" for sentence in sentences if sentence),
         f"![Safety and performance of {experiment['name']}]({picture.name})",
         markdown_of(texts(table, axes, shown_metrics(table, safety, performance))),
         f"```sh\n{sweep_command(record)}\n```",

@@ -26,7 +26,7 @@ from rss_shield.eval.run_folder import versions
 from rss_shield.eval.runs.backends import Outcome, Work, run_tasks
 from rss_shield.eval.runs.experiment import Experiment, as_words, read_experiment
 from rss_shield.eval.runs.points import check_there, metric_named, point_row
-from rss_shield.eval.runs.store import ERROR, Files, Store
+from rss_shield.eval.runs.store import ERROR, FAILED, Files, Store, last_line
 from rss_shield.eval.runs.tables import write_points
 from rss_shield.eval.runs.tasks import Task, samples_of, tasks_of
 from rss_shield.eval.suite.policies import check_policy
@@ -124,12 +124,8 @@ class Sweep:
 
     def why(self, outcome: Outcome) -> str:
         """One line: which task failed, of what, and where more is said."""
-        config = outcome.task.config
-        player = config["arm"] if "arm" in config else config["policy"]
-        what = [str(config["environment"]), str(player), f"seed {config['seed']}"]
-        setting = [f"{name} = {value}" for name, value in outcome.task.point.items() if name not in ROLES]
-        path, last = self.store.path(outcome.task) / ERROR, outcome.error.strip().splitlines()[-1]
-        return f"task {', '.join([*what, *setting])} failed: {last} (all of it: {path})"
+        path = self.store.path(outcome.task) / ERROR
+        return f"task {described(outcome.task)} failed: {last_line(outcome.error)} (all of it: {path})"
 
     def _ask_optuna(self) -> None:
         """Let Optuna's TPE choose, a batch at a time. Asked again, it chooses the same, so nothing is run twice."""
@@ -188,6 +184,14 @@ class Sweep:
         return pd.DataFrame(rows)
 
 
+def described(task: Task) -> str:
+    """Which one it is, in words."""
+    config = task.config
+    player = config["arm"] if "arm" in config else config["policy"]
+    setting = [f"{name} = {value}" for name, value in task.point.items() if name not in ROLES]
+    return ", ".join([str(config["environment"]), str(player), f"seed {config['seed']}", *setting])
+
+
 def _suggest(trial: Any, name: str, space: Any) -> Any:
     if hasattr(space, "low"):
         return trial.suggest_float(name, space.low, space.high, log=space.log)
@@ -233,6 +237,8 @@ def sweep(
         print(f"rss-shield sweep: warning: {warning}", file=sys.stderr)
     under_way = Sweep(experiment, folder, work, **run)
     under_way.run()
+    failed = [f"{described(outcome.task)} ({last_line(outcome.error)})" for outcome in under_way.failed]
+    write_json(folder / FAILED, failed)
     points = under_way.points(under_way.tasks)
     if len(points):
         axes = [name for name in points.columns if name not in ("metric", "value", "low", "high", "n", "over")]

@@ -142,6 +142,11 @@ def test_a_task_that_fails_says_so_in_one_line_and_is_done_again(tmp_path, monke
     (line,) = [line for line in said.err.splitlines() if line.startswith("rss-shield sweep: ")]
     assert "broken_driver:drive, seed 0 failed: " in line and "NameError: name 'sped' is not defined" in line
     assert path.parent.name in line and "Traceback" in path.read_text()
+    (failed,) = json.loads((tmp_path / "runs" / "e" / "failed.json").read_text())
+    assert (
+        failed
+        == "highway-fast-v0, broken_driver:drive, seed 0 (" + line.split("failed: ")[1].split(" (all of")[0] + ")"
+    )
     with pytest.raises(SystemExit):
         main(["sweep", "e.yaml"])  # what failed is not taken for done
 

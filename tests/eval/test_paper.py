@@ -151,6 +151,23 @@ def test_links_are_valid_whatever_folders_are_called(folder, tmp_path, monkeypat
     assert "## highway-fast-v0 (mein versuch (ä_1))" in markdown
 
 
+def test_code_without_a_commit_is_said_so(folder, tmp_path):
+    record = json.loads((folder / "config.json").read_text())
+    (folder / "config.json").write_text(json.dumps({**record, "git_commit": None, "git_changes": None}))
+    page = write((folder,), tmp_path / "report", "Installed").read_text()
+    assert "a-run: code without a commit; Python" in page and "None" not in page.split("<footer>")[1]
+
+
+def test_where_nobody_learns_there_are_no_training_seeds(folder, tmp_path):
+    record = json.loads((folder / "config.json").read_text())
+    record["config"] |= {"arms": ["lazy"], "rules": {}}
+    (folder / "config.json").write_text(json.dumps(record))
+    episodes_of(["ego"] * 3 + [""] * 17, "lazy", "on").to_csv(folder / "episodes.csv", index=False)
+    page = write((folder,), tmp_path / "report", "Scripted").read_text()
+    assert "<p>Drivers on highway-fast-v0, RSS preset auto, nobody learns.</p>" in page
+    assert "<p>1 cell (an arm, tested one way), 20 test episodes.</p>" in page
+
+
 def test_roads_together_have_profiles(folder, tmp_path):
     same, another = tmp_path / "same", tmp_path / "another"
     shutil.copytree(folder, same)

@@ -52,6 +52,29 @@ def test_equal_outcomes_have_equal_intervals_in_a_point(pooled):
     assert rows["crash"] == rows["at_fault"]
 
 
+def of_points(table, axes, performance="return"):
+    return of_sweep(
+        with_front(table, "at_fault", performance), axes, [("", list(range(len(table))))], "at_fault", performance
+    )
+
+
+def test_a_sweep_is_told_in_the_units_of_its_table():
+    table = pd.DataFrame({"ego.mu": [0.1 + 0.2, 1.0], "at_fault": [0.075, 0.0], "return": [21.04, 20.0]})
+    (said,) = of_points(table, ["ego.mu"])
+    assert said.endswith("The best return there is 21.0, with ego at fault 8 % (ego.mu = 0.3).")
+
+
+def test_the_best_of_what_is_better_small_is_the_smallest():
+    table = pd.DataFrame({"entry": ["a", "b"], "at_fault": [0.1, 0.0], "override_share": [0.25, 0.5]})
+    (said,) = of_points(table, ["entry"], "override_share")
+    assert "The best overridden there is 25 %, with ego at fault 10 % (entry = a)." in said
+
+
+def test_a_single_point_is_told_without_a_front():
+    table = pd.DataFrame({"at_fault": [0.0], "return": [20.0]})
+    assert of_points(table, []) == ["One point: return 20.0, ego at fault 0 %."]
+
+
 @pytest.mark.parametrize("groups", [1, 2, 3, 4, 5])
 def test_a_panel_without_points_is_not_drawn(groups):
     names = [f"environment {k}" for k in range(groups)]
