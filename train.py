@@ -19,10 +19,11 @@ from rss_shield.eval.run_folder import open_run
 from rss_shield.eval.suite.comparison.jobs import cells_of, in_engine, model_path, replaying, showing, testing, training
 from rss_shield.eval.suite.comparison.options import COMMAND, Config
 from rss_shield.eval.suite.comparison.reading import resolve, started
-from rss_shield.eval.suite.comparison.record import DERIVED, options_of, record
+from rss_shield.eval.suite.comparison.record import DERIVED, options_of, record, words_of
 from rss_shield.eval.suite.comparison.trying import tried
 
 PROGRAM = "train.py" if __name__ == "__main__" else COMMAND  # as it was called
+SHOWN = ("table.md", "results.json", "blame.png", "learning_curve.png", "removal.png", "frontier.png", "pages")
 
 
 def main(arguments: list[str]) -> None:
@@ -40,6 +41,7 @@ def main(arguments: list[str]) -> None:
             resume=config.resume,
             overwrite=config.overwrite,
             defaults={**options_of(Config()), DERIVED: recorded[DERIVED]},
+            command=words_of(config),
         )
     except (ValueError, OSError) as error:
         fail(PROGRAM, str(error))
@@ -61,7 +63,8 @@ def main(arguments: list[str]) -> None:
         run_jobs([showing(config, preset, folder, arm) for arm in filmed], config.workers)
 
     write_report(folder)
-    print(f"\nEverything is in {folder}: table.md, results.json, learning_curve.png, blame.png, ...")
+    there = [name for name in SHOWN if (folder / name).exists()]
+    print(f"\nEverything is in {folder}: {', '.join(there)}")
 
 
 def print_arms() -> None:

@@ -100,6 +100,13 @@ def split_arguments(arguments: Sequence[str], prefix: str = PREFIX) -> tuple[lis
     return others, values
 
 
+def as_text(value: Any) -> str:
+    """A value as `split_arguments` reads it: JSON, or a text as it is where nothing else is read from it."""
+    if isinstance(value, str) and not value.startswith("-") and _value(value) == value:
+        return value
+    return json.dumps(value)
+
+
 def _value(text: str) -> Any:
     for read in (json.loads, ast.literal_eval):
         try:

@@ -1,15 +1,46 @@
-"""Write files so that a kill leaves the old file or the new one, never half of one."""
+"""Files: names that every system takes, and writing so that a kill leaves the old file or the new one, never a half."""
 
+import hashlib
 import json
 import math
 import os
+import re
 import sys
-from collections.abc import Iterator
+import unicodedata
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+
+NAMES = "letters, digits and . , = + - _"
+LONGEST_NAME = 120
+DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{i}" for port in ("COM", "LPT") for i in range(10))}  # on Windows
+
+
+def valid_name(text: str) -> str:
+    """A name of a folder that every system takes: no / \\ : * ? " < > |, no dot at an end, no device, not too long."""
+    name = re.sub(r"[^\w=.,+-]+", "-", unicodedata.normalize("NFC", text)).strip("-.")
+    if name.split(".")[0].upper() in DEVICES:
+        name = f"_{name}"
+    if len(name) > LONGEST_NAME:
+        name = f"{name[: LONGEST_NAME - 9]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+    return name
+
+
+def linked_names(texts: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """A name for each, no two alike, in ASCII: links, LaTeX's labels and its paths take them as they are."""
+    used, names = {name.lower() for name in taken}, []
+    for text in texts:
+        ascii_only = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+        base = re.sub(r"[^A-Za-z0-9.+_-]+", "-", ascii_only).strip("-.") or "run"
+        name, number = base, 2
+        while name.lower() in used:
+            name, number = f"{base}-{number}", number + 1
+        used.add(name.lower())
+        names.append(name)
+    return names
 
 
 @contextmanager

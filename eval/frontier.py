@@ -6,6 +6,7 @@ road together.
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,9 @@ UP = (
     ("Crashes without the shield", OFF, "crash"),
 )
 SHARES = ("override_share", "crash")
+WHISKERS = (
+    "whiskers: 95 % intervals, thick over test episodes, thin over training seeds; those that reach the frame go on"
+)
 
 
 def points_of(summary: pd.DataFrame) -> pd.DataFrame:
@@ -56,18 +60,17 @@ def plot_frontier(summary: pd.DataFrame, folder: Path, title: str) -> None:
             for axes, across in zip(row, ACROSS, strict=True):
                 for arm in arms:
                     _point(axes, points, arm, across, up)
-                axes.set_xlim(_limits([line.get_xdata() for line in axes.get_lines()], across[2]))
-                axes.set_ylim(_limits([line.get_ydata() for line in axes.get_lines()], up[2]))
                 for axis, (_, _, metric) in ((axes.xaxis, across), (axes.yaxis, up)):
                     if metric in SHARES:
                         axis.set_major_formatter(PercentFormatter(1.0))
             row[0].set_ylabel(up[0])
+            row[0].set_ylim(limits_of(_drawn(points, up, ACROSS), up[2]))
         for axes, across in zip(grid[-1], ACROSS, strict=True):
             axes.set_xlabel(across[0])
+            axes.set_xlim(limits_of(_drawn(points, across, UP), across[2]))
         handles, labels = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
-        whiskers = "whiskers: 95 % intervals, thick over test episodes, thin over training seeds"
-        figure.suptitle(f"{title}: who needs the shield ({whiskers})", size=8)
+        figure.suptitle(f"{title}: who needs the shield\n{WHISKERS}", size=8)
         save(figure, folder / "frontier")
 
 
@@ -89,11 +92,33 @@ def _whisker(value: Any, low: str, high: str) -> list[list[float]]:
     return np.maximum(ends, 0.0).tolist()
 
 
-def _limits(values: list[Any], metric: str) -> tuple[float, float]:
-    """By the points, so that a wide interval does not hide them."""
-    known = np.concatenate([np.asarray(value, float) for value in values]) if values else np.zeros(1)
-    margin = 0.12 * max(float(np.ptp(known)), 1e-3 if metric in SHARES else 0.1)
-    return float(known.min() - margin), float(known.max() + margin)
+def _drawn(points: pd.DataFrame, axis: tuple[str, str, str], others: Sequence[tuple[str, str, str]]) -> pd.DataFrame:
+    """Rows of an axis: of the arms that have a place on any of the others, too."""
+    there = points.index
+    arms = [arm for arm in there.unique("arm") if any((arm, *other[1:]) in there for other in others)]
+    return points.loc[[key for arm in arms if (key := (arm, *axis[1:])) in there]]
+
+
+def limits_of(rows: pd.DataFrame, metric: str) -> tuple[float, float]:
+    """The ends of an axis: around all intervals over episodes, and over seeds unless these are so wide as to hide them.
+
+    Args:
+      rows: an arm each; value, low, high, seed_low, seed_high.
+
+    Returns:
+      The intervals over episodes have at least a third of the axis.
+    """
+    near = rows[["value", "low", "high"]].to_numpy(float)
+    known = near[np.isfinite(near)]
+    if not known.size:
+        return 0.0, 1.0
+    low, high = float(known.min()), float(known.max())
+    span = max(high - low, 1e-3 if metric in SHARES else 0.1)
+    far = rows[["seed_low", "seed_high"]].to_numpy(float)
+    ends = np.clip(far[np.isfinite(far)], low - span, high + span)
+    low, high = float(min([low, *ends])), float(max([high, *ends]))
+    margin = 0.06 * max(high - low, span)
+    return low - margin, high + margin
 
 
 def summary_of(run: Path) -> tuple[str, pd.DataFrame]:

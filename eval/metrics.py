@@ -110,15 +110,14 @@ def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
     Returns:
       Columns train, test, metric, value, low, high, n, seed_low, seed_high, seeds; cells in order of
       appearance. n, seeds: the episodes and the training seeds that have the metric; low, high: over
-      episodes; seed_low, seed_high: see `over_seeds`. The bootstrap draws from a generator of its own,
-      so the same episodes give the same intervals.
+      episodes; seed_low, seed_high: see `over_seeds`. The bootstrap draws from a generator of its own for
+      every metric of every cell, so the same values give the same intervals.
     """
-    rng = np.random.default_rng(0)
     rows = []
     for (train, test), cell in with_outcomes(episodes).groupby(["train", "test"], sort=False):
         for metric in metrics_in(cell.columns):
             known = cell[["train_seed", metric.name]].astype(float).dropna()
-            interval = _statistic(metric, known[metric.name].to_numpy(), rng)
+            interval = _statistic(metric, known[metric.name].to_numpy(), np.random.default_rng(0))
             per_seed = known.groupby("train_seed")[metric.name]
             values = per_seed.median() if metric.statistic == "median" else per_seed.mean()
             seeds = over_seeds(values.to_numpy(), interval, metric.limits)
@@ -169,7 +168,6 @@ def differences(episodes: pd.DataFrame) -> pd.DataFrame:
     Returns:
       Columns train, test, metric, value, low, high, n, seed_low, seed_high, seeds, as in `summarise`.
     """
-    rng = np.random.default_rng(0)
     cells = list(with_outcomes(episodes).groupby(["train", "test"], sort=False))
     rows = []
     for (train, test), cell in cells[1:]:
@@ -178,7 +176,7 @@ def differences(episodes: pd.DataFrame) -> pd.DataFrame:
             sample = pairs[metric.name].to_numpy(float)
             baseline = pairs[f"{metric.name}_baseline"].to_numpy(float)
             known = ~np.isnan(sample - baseline)
-            interval = paired_difference(sample[known], baseline[known], rng)
+            interval = paired_difference(sample[known], baseline[known], np.random.default_rng(0))
             values = pd.Series(sample - baseline)[known].groupby(pairs["train_seed"][known]).mean()
             seeds = over_seeds(values.to_numpy(), interval, (-math.inf, math.inf))
             rows.append({"train": train, "test": test, "metric": metric.name, **interval._asdict(), **seeds})

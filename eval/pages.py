@@ -6,6 +6,7 @@ docs/results/ppo.md; without names, all below runs/.
 
 import argparse
 import json
+import shlex
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -68,16 +69,26 @@ def ppo_page(runs: Iterable[Path]) -> list[str]:
         summary = pd.DataFrame(results["cells"])
         frame = table_frame(summary)
         title, config = (run / "table.md").read_text(encoding="utf-8").splitlines()[0], results["config"]
-        parts += [f"## `{config['env_id']}`, {run.name}", f"{title}.", f"```sh\n{command(config)}\n```"]
+        recorded = run / "config.json"
+        record = json.loads(recorded.read_text(encoding="utf-8")) if recorded.exists() else {"config": config}
+        parts += [f"## `{config['env_id']}`, {run.name}", f"{title}.", f"```sh\n{command(record)}\n```"]
         parts += [markdown(_turned(frame)), *_replayed(results["replays"]), *_provenance(run)]
         legends.append(legend(summary))
     return [*parts, "## What the rows mean", max(legends, key=len)] if legends else parts
 
 
-def command(config: dict[str, Any]) -> str:
-    """The command line of a run, as far as the page tells of it."""
-    words = ["python train.py --env-id", config["env_id"], "--total-timesteps", config["total_timesteps"], "--seeds"]
-    words += config["seeds"]
+def command(record: dict[str, Any]) -> str:
+    """The command line that asks for the same as a run did, in a folder of its own.
+
+    Args:
+      record: of the run, `config.json`.
+    """
+    return shlex.join(["rss-shield", "train", *map(str, record.get("command") or _told(record["config"]))])
+
+
+def _told(config: dict[str, Any]) -> list[Any]:
+    """Options of a run that is older than the record of its command, as far as pages tell of it."""
+    words = ["--env-id", config["env_id"], "--total-timesteps", config["total_timesteps"], "--seeds", *config["seeds"]]
     if config.get("arms", list(USUAL)) != list(USUAL):
         words += ["--arms", *config["arms"]]
     if config["parameters"].get("roads_cross"):
@@ -86,7 +97,7 @@ def command(config: dict[str, Any]) -> str:
         words += ["--reward", config["reward"]]
     if config["intervention_penalty"]:
         words += ["--intervention-penalty", config["intervention_penalty"]]
-    return " ".join(map(str, words))
+    return words
 
 
 def _provenance(run: Path) -> list[str]:

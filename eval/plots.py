@@ -212,9 +212,13 @@ def seeds_text(count: int) -> str:
 
 
 def save(figure: Figure, stem: Path) -> None:
-    """As PNG and PDF; the same data give the same file."""
+    """As PNG and PDF beside each other; the same data give the same file.
+
+    Args:
+      stem: the path without an ending; what follows a dot in it, as in penalty-0.1, is part of the name.
+    """
     for kind in ("png", "pdf"):
-        with atomic(stem.with_suffix(f".{kind}")) as temporary:
+        with atomic(stem.with_name(f"{stem.name}.{kind}")) as temporary:
             # a fixed date: the same data give the same file
             metadata = {"CreationDate": None} if kind == "pdf" else None
             figure.savefig(temporary, format=kind, metadata=metadata)

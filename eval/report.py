@@ -23,6 +23,18 @@ from rss_shield.eval.replay import compare, verdict
 from rss_shield.eval.run_folder import changes
 from rss_shield.eval.table import print_table, write_table
 
+USUAL_OPTIONS = {  # of `rss-shield train`, which a title names where they are others
+    "backend": "fast",
+    "traffic": "stock",
+    "filter": "rss",
+    "filter_at": None,
+    "examine": "table",
+    "correction": "nearest",
+    "replace": "frame",
+    "penalty_on": "response",
+    "history": 1,
+    "network": "mlp",
+}
 _PLACE = {"line": "at the line", "anywhere": "anywhere"}
 
 
@@ -68,12 +80,7 @@ def write_report(folder: Path) -> None:
             "replays": [] if compared is None else compared.to_dict("records"),
         },
     )
-    n_seeds = f"{len(seeds)} training seed" + ("s" if len(seeds) > 1 else "")
-    title = (
-        f"{_who(arms)} on {config['env_id']}{_given('config', config['config'])}, RSS preset {config['preset']}"
-        f"{_given('ego', config['ego'])}{_given('other', config['other'])}, {_conduct(config)}"
-        f"{config['total_timesteps']} timesteps per arm, {_penalty(config)}, {n_seeds}"
-    )
+    title = title_of(config)
     for arm, seed in models:
         of_model = (episodes["train"] == arm_named(arm).called) & (episodes["train_seed"] == seed)
         write_card(folder / f"{arm}-seed{seed}", arm, seed, run, episodes[of_model])
@@ -91,28 +98,59 @@ def write_report(folder: Path) -> None:
     print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160), note)
 
 
+def title_of(config: dict[str, Any]) -> str:
+    """What a run is: who drove where, under which table and rules, how much they learnt, and what else is unusual.
+
+    Args:
+      config: of its record; what an older run lacks is as usual.
+    """
+    arms = [arm_named(name) for name in config["arms"]]
+    table = "".join(_given(option, config) for option in ("ego", "other", "rules"))
+    unusual = [f"{name} {config[name]}" for name, usual in USUAL_OPTIONS.items() if config.get(name, usual) != usual]
+    return ", ".join(
+        [
+            f"{_who(arms)} on {config['env_id']}{_given('config', config)}",
+            f"RSS preset {config.get('preset', 'auto')}{table}",
+            *unusual,
+            *_conduct(config),
+            *([f"reward {config['reward']}"] if config.get("reward") else []),
+            *(["nobody learns"] if all(arm.scripted for arm in arms) else _learnt(config)),
+        ]
+    )
+
+
+def _learnt(config: dict[str, Any]) -> list[str]:
+    seeds = len(config["seeds"])
+    return [
+        f"{config['total_timesteps']} timesteps per arm{_given('hyperparameters', config)}",
+        _penalty(config),
+        f"{seeds} training seed{'s' if seeds > 1 else ''}",
+    ]
+
+
 def _who(arms: Sequence[Arm]) -> str:
+    if all(arm.scripted for arm in arms):
+        return "Drivers"
     return "PPO" if all(arm.learner == "ppo" for arm in arms) else "Agents"
 
 
-def _given(option: str, values: dict[str, Any]) -> str:
-    """What replaces the defaults of an environment or a preset: " (config.lanes_count 4)"; empty if nothing does."""
-    named = [f"{option}.{name} {value}" for name, value, _ in changes(values, {})]
+def _given(option: str, config: dict[str, Any]) -> str:
+    """What replaces defaults: " (config.lanes_count 4)", " (rules.memory False)"; empty if nothing does."""
+    named = [f"{option}.{name} {value}" for name, value, _ in changes(config.get(option, {}), {})]
     return f" ({', '.join(named)})" if named else ""
 
 
 def _penalty(config: dict[str, Any]) -> str:
     """The training reward of the shielded arm is not that of the other one if there is a penalty."""
     penalty = config["intervention_penalty"]
-    own = f"reward {config['reward']} and " if config.get("reward") else ""
-    return own + (f"intervention penalty {penalty:g} in training" if penalty else "no intervention penalty")
+    return f"intervention penalty {penalty:g} in training" if penalty else "no intervention penalty"
 
 
-def _conduct(config: dict[str, Any]) -> str:
+def _conduct(config: dict[str, Any]) -> list[str]:
     """How the ego behaves where roads cross; empty where none do."""
     if not config["parameters"].get("roads_cross"):
-        return ""
-    return f"{config['entry']} entry, {config['intent']} intent, waiting {_PLACE[config['waiting']]}, "
+        return []
+    return [f"{config['entry']} entry", f"{config['intent']} intent", f"waiting {_PLACE[config['waiting']]}"]
 
 
 def cell_path(folder: Path, arm: str, seed: int, test: str) -> Path:

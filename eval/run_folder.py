@@ -6,7 +6,7 @@ import os
 import platform
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,7 @@ def open_run(
     resume: bool,
     overwrite: bool,
     defaults: Mapping[str, Any] = {},
+    command: Sequence[str] = (),
 ) -> list[str]:
     """Make the folder of a run, or check that the run in it may go on, and record its configuration.
 
@@ -46,6 +47,7 @@ def open_run(
       resume: go on with the run in the folder, if there is one.
       overwrite: throw the run in the folder away, if there is one.
       defaults: of options, which a run that was started before there were these has had.
+      command: options of a command line that asks for this configuration, for pages; of a new run it is recorded.
 
     Returns:
       Warnings: what has changed in packages and code since the run was started.
@@ -67,7 +69,7 @@ def open_run(
     folder.mkdir(parents=True, exist_ok=True)
     provenance = {"config": config, **versions()}
     if not record.exists():
-        write_json(record, provenance)
+        write_json(record, provenance | ({"command": list(command)} if command else {}))
         return []
     before = json.loads(record.read_text(encoding="utf-8"))
     now = json.loads(to_json(provenance))

@@ -20,11 +20,11 @@ LEGEND = (
     "the n test episodes) = ego at fault + other at fault + inherited (the episode began in that danger) + none "
     "(unexplained: a bug). overridden: % of simulation frames on which a duty changed the command; anticipated: on "
     "which no duty did, but anticipation; change: of the acceleration, mean size over the frames. length: decisions. "
-    "min TTC: smallest time to collision, median of the episodes. rms jerk: along the car; hard braking: % of frames "
-    "below -3 m/s²; comfortable: % inside nuPlan's bounds of acceleration, jerk, lateral and yaw acceleration; min "
-    "time gap: to the car ahead, median. [low, high]: 95 % interval over test episodes of these trained models (rates "
-    "Wilson, others bootstrap). (low, high): the same over training seeds, so what other seeds may give (Student's t "
-    "of the seeds' values, at least as wide as the first; – for a single seed)."
+    "min TTC: smallest time to collision, median of the episodes of all training seeds. rms jerk: along the car; hard "
+    "braking: % of frames below -3 m/s²; comfortable: % inside nuPlan's bounds of acceleration, jerk, lateral and yaw "
+    "acceleration; min time gap: to the car ahead, median. [low, high]: 95 % interval over test episodes of these "
+    "trained models (rates Wilson, others bootstrap). (low, high): the same over training seeds, so what other seeds "
+    "may give (Student's t of the seeds' values, at least as wide as the first; – for a single seed)."
 )
 MOST_DIGITS = 9  # what is closer to a limit is at the limit
 GOAL_LEGEND = (

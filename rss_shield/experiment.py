@@ -48,7 +48,9 @@ def expanded(command: str, arguments: list[str]) -> list[list[str]]:
 
 def run_folder(experiment: "Experiment", env_id: str) -> str:
     """Name of the folder of one environment's run."""
-    return experiment.name if len(experiment.environments) == 1 else f"{experiment.name}-{env_id}"
+    from rss_shield.eval.files import valid_name
+
+    return experiment.name if len(experiment.environments) == 1 else valid_name(f"{experiment.name}-{env_id}")
 
 
 def train_words(file: str, experiment: "Experiment", env_id: str) -> list[str]:

@@ -4,6 +4,7 @@ import pytest
 from places import ROOT
 
 from rss_shield.cli import main
+from rss_shield.eval.files import valid_name
 from rss_shield.eval.suite.comparison.options import FIRST_TEST_SEED
 from rss_shield.eval.suite.comparison.reading import started
 from rss_shield.experiment import expanded
@@ -35,6 +36,15 @@ def test_an_experiment_is_one_training_run_per_road(file):
     config, folder = started(first)
     assert config.risk and not config.rules.memory and config.config == {"lanes_count": 2}
     assert folder.name == "two-roads-highway-fast-v0"
+
+
+@pytest.mark.parametrize("name", ["mein versuch", "größer 2.1", "a,b=c & d"])
+def test_a_file_of_any_name_is_a_run_of_a_valid_one(name, tmp_path):
+    (tmp_path / f"{name}.yaml").write_text(TWO_ROADS.replace("merge-v0", "highway_env:merge-v0"))
+    lines = expanded("train", [str(tmp_path / f"{name}.yaml")])
+    folders = [words[1] for words in lines]
+    assert folders == [valid_name(folder) for folder in folders] and " " not in "".join(folders)
+    started(lines[0])
 
 
 @pytest.mark.parametrize("name", ["compare", "arms"])

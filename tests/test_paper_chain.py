@@ -9,10 +9,11 @@ import pytest
 
 from bench import paper
 from bench.campaign import PLANS
-from rss_shield.eval.paper import sweeps
+from rss_shield.eval.paper import command, sweeps
 from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.runs.experiment import experiment_of
 from rss_shield.eval.runs.points import metric_named
+from rss_shield.eval.runs.store import missing_in
 from rss_shield.eval.runs.tables import labels_of
 from rss_shield.eval.suite.sweep import with_budget
 
@@ -125,11 +126,32 @@ def test_the_page_of_sweeps_has_the_front_in_words_and_in_a_picture(swept, tmp_p
         and "| carla | 10 [10, 10] | 21.0 [21.0, 21.0] | ★ |" in text
     )
     assert "| ad-rss | 20 [20, 20] | 20.5 [20.5, 20.5] |  |" in text
-    assert "- 2 of 3 points are on the Pareto front" in text and "(preset = carla)" in text
+    assert "- 2 of 3 points are on the Pareto front" in text
+    assert "The best return there is 21.0, with crash 10 % (preset = carla)." in text and "failed" not in text
     assert '40 episodes a row; all with {"config.lanes_count": 2}.' in text
     assert "znver4, 2 cores, Linux. Seeds 0; test episodes from 7, 40 each." in text
     assert (tmp_path / "out" / "sweeps-tables.png").stat().st_size > 10_000
     assert len(records_of([swept, tmp_path])) == 1
+
+
+def test_pages_of_a_sweep_name_the_tasks_that_failed(swept, tmp_path):
+    failed = [
+        "merge-v0, mine:drive, seed 0 (NameError: name 'x' is not defined)",
+        "merge-v0, mine:drive, seed 1 (killed)",
+    ]
+    (swept / "failed.json").write_text(json.dumps(failed))
+    said = f"2 tasks failed, and the points that need them are missing: {'; '.join(failed)}."
+    assert f"- {said}" in sweeps.write([swept], tmp_path / "out").read_text(encoding="utf-8")
+    command.write((swept,), tmp_path / "report", "One failed")
+    report = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
+    assert said in report and "Safety and performance: crash against return" in report
+    (swept / "failed.json").unlink()  # as older ones are
+    for key, done in (("a1", True), ("b2", False)):
+        (swept / "tasks" / key).mkdir(parents=True)
+        (swept / "tasks" / key / "error.txt").write_text("Traceback\n  ...\nValueError: too fast\n")
+        if done:
+            (swept / "tasks" / key / "task.json").write_text("{}")
+    assert missing_in(swept) == "One task failed, and the points that need them are missing: b2 (ValueError: too fast)."
 
 
 def test_points_that_nearly_coincide_share_a_label():

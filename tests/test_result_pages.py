@@ -161,5 +161,8 @@ def test_the_page_of_trained_agents_has_a_table_per_run(tmp_path):
     (run / "table.md").write_text("PPO on intersection-v0\n\n| ... |\n", encoding="utf-8")
     text = "\n\n".join(pages.ppo_page([tmp_path / "unfinished", run]))
     assert "## `intersection-v0`, mine\n\nPPO on intersection-v0." in text
-    assert "--env-id intersection-v0 --total-timesteps 50000 --seeds 0 1 --intent known --entry cautious" in text
+    assert (
+        "rss-shield train --env-id intersection-v0 --total-timesteps 50000 --seeds 0 1 --intent known --entry cautious"
+        in text
+    )
     assert "| train / test | off / on |\n| --- | --- |\n| n | 4 |\n| crash [%] | 50 [40, 60] (–) |" in text

@@ -18,8 +18,9 @@ from places import ROOT
 from stable_baselines3 import PPO
 
 from rss_shield.command_line import Overrides
+from rss_shield.eval.files import valid_name
 from rss_shield.eval.metrics import METRICS, with_outcomes
-from rss_shield.eval.suite.comparison.naming import run_name, valid_name
+from rss_shield.eval.suite.comparison.naming import run_name
 from rss_shield.eval.suite.comparison.options import Config
 from rss_shield.eval.suite.comparison.reading import preset_name, resolve, started
 from rss_shield.shield.params import PRESETS, RSSParams
@@ -198,7 +199,8 @@ def test_a_run_prints_one_table_and_where_everything_is(finished):
     folder, output = finished
     assert " ".join(output.split()).count("95 % interval") == 1
     assert "Traceback" not in output
-    assert f"Everything is in {folder}" in output
+    named = output.split(f"Everything is in {folder}: ")[1].split("\n")[0].split(", ")
+    assert "learning_curve.png" in named and all((folder / name).exists() for name in named)
 
 
 def test_a_run_writes_everything_a_paper_needs(finished):
@@ -450,6 +452,8 @@ NAMED = [
     ("NUL", "_NUL"),
     ("com1.old", "_com1.old"),
     ("merge-v0,seeds=1-2", "merge-v0,seeds=1-2"),
+    ("mein früher versuch", "mein-früher-versuch"),
+    ("pru\u0308fung", "prüfung"),  # as macOS spells it
 ]
 
 

@@ -55,8 +55,7 @@ class Road(NamedTuple):
     """What the runs on one road left."""
 
     env_id: str
-    configs: list[dict[str, Any]]
-    records: list[dict[str, Any]]  # the same, with versions and machine
+    records: list[dict[str, Any]]  # options, versions and machine of each
     episodes: pd.DataFrame  # test episodes; train as in tables
     curves: pd.DataFrame  # training episodes; arm, train_seed
     removals: pd.DataFrame
@@ -96,7 +95,7 @@ def _road(env_id: str, runs: list[Path]) -> Road:
                 curves.append(pd.read_csv(path).assign(arm=arm, train_seed=seed))
     episodes = pd.concat([pd.read_csv(run / "episodes.csv") for run in runs], ignore_index=True)
     trained = _joined(curves), _joined(removals), _joined(prices)
-    return Road(env_id, configs, records_of(runs), with_outcomes(episodes), *trained, _longer(runs))
+    return Road(env_id, records_of(runs), with_outcomes(episodes), *trained, _longer(runs))
 
 
 def _longer(runs: list[Path]) -> dict[str, pd.DataFrame]:
@@ -375,7 +374,7 @@ def section_of(road: Road, folder: Path) -> list[str]:
     arms = [ARMS[name] for name in dict.fromkeys(arm for arm, _ in cells)]
     counts = sorted({len(rows) // rows["train_seed"].nunique() for rows in cells.values()})
     episodes = " or ".join(map(str, counts))
-    commands = "\n".join(command(config) for config in road.configs)
+    commands = "\n".join(map(command, road.records))
     return [
         f"## `{road.env_id}`",
         first_sentences(road, cells),

@@ -6,13 +6,14 @@
 Writes OUT/index.html (self-contained), report.md, report.tex, and figures/RUN/*.png and .pdf. Nothing is trained.
 """
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from rss_shield.eval.files import folder_for, refuse
+from rss_shield.eval.files import folder_for, linked_names, refuse
 from rss_shield.eval.paper.read import across_roads, section_of
 from rss_shield.eval.paper.render import write_report
 from rss_shield.eval.provenance import records_of
@@ -42,11 +43,17 @@ def write(runs: tuple[Path, ...], out: Path | None, title: str) -> Path:
     if unknown is not None:
         raise ValueError(f"{unknown}: expected the folder of a finished run or sweep")
     out = folder_for(out or runs[0] / "report")
-    sections = [section_of(run, out / "figures" / run.name) for run in runs]
+    names = linked_names(map(_name, runs), taken=["roads"])
+    sections = [section_of(run, out / "figures" / name) for run, name in zip(runs, names, strict=True)]
     together = across_roads(runs, out / "figures" / "roads")
     sections += [together] if together else []
     write_report(out, title, sections, footer(runs))
     return out / "index.html"
+
+
+def _name(run: Path) -> str:
+    """Of a folder, also of one that is named as it is seen from here, as . is."""
+    return Path(os.path.abspath(run)).name
 
 
 def footer(runs: tuple[Path, ...]) -> str:
@@ -56,11 +63,11 @@ def footer(runs: tuple[Path, ...]) -> str:
         for record in records_of([run]):
             versions = record.get("versions", record)
             packages = ", ".join(f"{package} {version}" for package, version in versions["packages"].items() if version)
-            code = f"{versions['git_commit']}{' with changes' if versions['git_changes'] else ''}"
+            changed = " with changes" if versions["git_changes"] else ""
+            code = f"code {versions['git_commit']}{changed}" if versions["git_commit"] else "code without a commit"
             cores = f", {versions['cores']} cores" if "cores" in versions else ""
             lines += [
-                f"{run.name}: code {code}; Python {versions['python']}; {versions['platform']}; "
-                f"{versions['cpu']}{cores}",
+                f"{_name(run)}: {code}; Python {versions['python']}; {versions['platform']}; {versions['cpu']}{cores}",
                 f"  {packages}",
             ]
     return "\n".join(lines)

@@ -21,13 +21,13 @@ def comparisons(episodes: pd.DataFrame) -> pd.DataFrame:
       episodes of all seeds, of these trained models; p_holm corrects for all tests of the run.
     """
     cells = list(with_outcomes(episodes).groupby(["train", "test"], sort=False))
-    rng, rows = np.random.default_rng(0), []
+    rows = []
     for (train, test), cell in cells[1:]:
         pairs = paired(cell, cells[0][1], "_first")
         for metric in COMPARED:
             here, there = pairs[metric].astype(float), pairs[f"{metric}_first"].astype(float)
             is_rate = metric in RATES
-            found = difference(pairs, here, there, rng, is_rate)
+            found = difference(pairs, here, there, np.random.default_rng(0), is_rate)  # equal values, equal intervals
             row = {"train": train, "test": test, "metric": metric, **found._asdict()}
             if is_rate:
                 discordant = mcnemar(here, there)

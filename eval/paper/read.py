@@ -1,6 +1,8 @@
 """Runs and sweeps as sections of a report."""
 
 import json
+import os
+import shlex
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +13,7 @@ import pandas as pd
 
 from rss_shield.eval import removal
 from rss_shield.eval.arms import arm_called
+from rss_shield.eval.files import linked_names
 from rss_shield.eval.frontier import plot_frontier
 from rss_shield.eval.metrics import summarise, with_outcomes
 from rss_shield.eval.pages import command
@@ -19,9 +22,11 @@ from rss_shield.eval.paper.compared import as_texts, comparisons
 from rss_shield.eval.paper.figures import plot_comfort, plot_profiles
 from rss_shield.eval.paper.section import Figure, Section, Table
 from rss_shield.eval.plots import plot_blame, plot_learning_curve, save
+from rss_shield.eval.report import title_of
 from rss_shield.eval.run_folder import filmstrips_of, pages_of
-from rss_shield.eval.runs.points import groups_of, with_front
-from rss_shield.eval.runs.tables import plot_front, shown_metrics, texts, wide
+from rss_shield.eval.runs.points import groups_of, metric_named, with_front
+from rss_shield.eval.runs.store import missing_in
+from rss_shield.eval.runs.tables import intervals_of, plot_front, shown_metrics, texts, wide
 from rss_shield.eval.stats import Interval, interquartile_mean, probability_of_improvement
 from rss_shield.eval.table import legend, table_frame
 
@@ -47,11 +52,12 @@ def section_of(folder: Path, figures: Path) -> Section:
 
     Args:
       folder: of results.
-      figures: folder that its figures are drawn into.
+      figures: folder that its figures are drawn into; its name heads the labels of tables.
 
     Raises:
       ValueError: neither of both, or not finished.
     """
+    folder = Path(os.path.abspath(folder))  # which has a name, unlike .
     figures.mkdir(parents=True, exist_ok=True)
     if (folder / "experiment.json").exists() and (folder / "points.csv").exists():
         return _of_sweep(folder, figures)
@@ -62,19 +68,20 @@ def section_of(folder: Path, figures: Path) -> Section:
 
 
 def _of_run(folder: Path, figures: Path) -> Section:
-    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
+    record = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    config = record["config"]
     episodes = read_episodes(folder)
     summary, compared = summarise(episodes), comparisons(episodes)
     frame = table_frame(summary)
     tables = [
-        Table(f"{folder.name}-{name.split()[0].lower()}", f"{name}. {INTERVALS}", turned(frame, headings))
+        Table(f"{figures.name}-{name.split()[0].lower()}", f"{name}. {INTERVALS}", turned(frame, headings))
         for name, headings in GROUPS.items()
         if any(heading.split(" [")[0] in headings for heading in frame.columns)
     ]
     if len(compared):
         tables.append(
             Table(
-                f"{folder.name}-compared",
+                f"{figures.name}-compared",
                 "Differences to the first cell, paired by seed and test episode. only here / only first: episodes "
                 "in which one of both had the outcome.",
                 as_texts(compared),
@@ -82,11 +89,11 @@ def _of_run(folder: Path, figures: Path) -> Section:
         )
     return Section(
         folder.name if folder.name == config["env_id"] else f"{config['env_id']} ({folder.name})",
-        words.of_run(episodes, summary, compared),
+        [f"{title_of(config)}.", *words.of_run(episodes, summary, compared)],
         tables,
         list(_figures_of_run(folder, figures, config, episodes, summary)),
         legend(summary),
-        command(config),
+        command(record),
         pages_of(folder),
     )
 
@@ -113,10 +120,11 @@ def _figures_of_run(folder: Path, figures: Path, config: dict[str, Any], episode
     if plot_comfort(summary, figures, road):
         yield Figure("How the ride feels.", figures / "comfort.png")
     for strip in filmstrips_of(folder):
+        (name,) = linked_names([strip.stem])
         for suffix in (".png", ".pdf"):
-            shutil.copyfile(strip.with_suffix(suffix), figures / f"{strip.stem}{suffix}")
+            shutil.copyfile(strip.with_suffix(suffix), figures / f"{name}{suffix}")
         text = f"{strip.stem}: five moments from above (the ego blue, who it was about red), and the margins over time."
-        yield Figure(text, figures / strip.name)
+        yield Figure(text, figures / f"{name}.png")
 
 
 def _of_sweep(folder: Path, figures: Path) -> Section:
@@ -128,22 +136,27 @@ def _of_sweep(folder: Path, figures: Path) -> Section:
     table = with_front(wide(points, axes), safety, performance)
     figure = plot_front(table, axes, safety, performance, experiment["name"])
     save(figure, figures / "pareto")
-    over = ", ".join(sorted(set(points["over"])))
-    caption = f"Points of the sweep; [low, high]: 95 % intervals over {over}; ★: on the Pareto front of its panel."
+    caption = f"Points of the sweep. {intervals_of(points)}; ★: on the Pareto front of its panel."
     inner = [name for name in axes if name not in ("environment", "policy", "test")]
     groups = [(label, rows.tolist()) for label, rows in groups_of(table)]
     return Section(
         f"Sweep {experiment['name']}",
-        [experiment["about"], *words.of_sweep(table, inner, groups, safety, performance)],
-        [Table(experiment["name"], caption, texts(table, axes, shown_metrics(table, safety, performance)))],
+        [experiment["about"], *words.of_sweep(table, inner, groups, safety, performance), missing_in(folder)],
+        [Table(figures.name, caption, texts(table, axes, shown_metrics(table, safety, performance)))],
         [
             Figure(
-                f"Safety and performance: {safety} against {performance}, with the Pareto front.",
+                f"Safety and performance: {metric_named(safety).label} against {metric_named(performance).label}, with "
+                "the Pareto front.",
                 figures / "pareto.png",
             )
         ],
-        command=f"rss-shield sweep {file_of(record)}",
+        command=sweep_command(record),
     )
+
+
+def sweep_command(record: dict[str, Any]) -> str:
+    """The command line that makes a sweep again."""
+    return shlex.join(["rss-shield", "sweep", file_of(record), *record.get("options", [])])
 
 
 def file_of(record: dict[str, Any]) -> str:
@@ -206,10 +219,10 @@ def across_roads(folders: Sequence[Path], figures: Path) -> Section | None:
         return None
     figures.mkdir(parents=True, exist_ok=True)
     plot_profiles(scores, figures, f"Performance profiles over {len(roads)} roads")
-    first, rng, rows = next(iter(scores)), np.random.default_rng(0), []
+    first, rows = next(iter(scores)), []
     for name, table in scores.items():
-        middle = interquartile_mean(table, rng)
-        better = probability_of_improvement(table, scores[first], rng)
+        middle = interquartile_mean(table, np.random.default_rng(0))
+        better = probability_of_improvement(table, scores[first], np.random.default_rng(0))
         rows.append(
             {
                 "train / test": name,

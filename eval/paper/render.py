@@ -4,6 +4,7 @@ import base64
 import html
 import os
 from pathlib import Path
+from urllib.parse import quote
 
 import pandas as pd
 
@@ -31,6 +32,8 @@ pre { background: #f6f8fa; padding: .6rem; font-size: .85rem; white-space: pre-w
 _ESCAPES = {
     "\\": r"\textbackslash{}",
     **{sign: f"\\{sign}" for sign in "%&#_${}"},
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
     "–": "--",
     "★": r"$\star$",
     "²": r"$^2$",
@@ -103,8 +106,8 @@ def as_markdown(title: str, sections: list[Section], footer: str, here: Path) ->
 
 
 def _place(path: Path, here: Path) -> str:
-    """Where a file is, seen from a folder."""
-    return Path(os.path.relpath(path, here)).as_posix()
+    """Where a file is, seen from a folder; a link as HTML and Markdown take it, whatever folders are called."""
+    return quote(Path(os.path.relpath(path, here)).as_posix())
 
 
 def as_latex(sections: list[Section]) -> str:

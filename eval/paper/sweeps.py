@@ -13,12 +13,13 @@ from typing import Any
 
 import pandas as pd
 
-from rss_shield.eval.files import atomic
+from rss_shield.eval.files import atomic, linked_names
 from rss_shield.eval.pages import write_page
 from rss_shield.eval.paper import words
-from rss_shield.eval.paper.read import file_of
+from rss_shield.eval.paper.read import file_of, sweep_command
 from rss_shield.eval.provenance import provenance, records_of
 from rss_shield.eval.runs.points import APART, groups_of, with_front
+from rss_shield.eval.runs.store import missing_in
 from rss_shield.eval.runs.tables import markdown_of, plot_front, shown_metrics, texts, wide
 
 PAGE = "sweeps.md"
@@ -47,19 +48,20 @@ def section_of(folder: Path, out: Path) -> list[str]:
     table = with_front(wide(points, axes), safety, performance)
     groups = [(label, rows.tolist()) for label, rows in groups_of(table)]
     inner = [name for name in axes if name not in APART]
-    picture = out / f"sweeps-{experiment['name']}.png"
+    (name,) = linked_names([f"sweeps-{experiment['name']}"])
+    picture = out / f"{name}.png"
     with atomic(picture) as temporary:
         plot_front(table, axes, safety, performance, experiment["name"]).savefig(temporary, format="png")
-    sentences = words.of_sweep(table, inner, groups, safety, performance)
+    sentences = [*words.of_sweep(table, inner, groups, safety, performance), missing_in(folder)]
     fixed = experiment["options"]
     return [
         f"## `{file_of(record)}`",
         experiment["about"],
         played(experiment) + (f"; all with {json.dumps(fixed)}." if fixed else "."),
-        "\n".join(f"- {sentence}" for sentence in sentences),
+        "\n".join(f"- {sentence}" for sentence in sentences if sentence),
         f"![Safety and performance of {experiment['name']}]({picture.name})",
         markdown_of(texts(table, axes, shown_metrics(table, safety, performance))),
-        f"```sh\nrss-shield sweep {file_of(record)}\n```",
+        f"```sh\n{sweep_command(record)}\n```",
         provenance([record]),
     ]
 

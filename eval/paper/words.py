@@ -2,9 +2,12 @@
 
 import pandas as pd
 
-from rss_shield.eval.metrics import with_outcomes
+from rss_shield.eval.arms import arm_called
+from rss_shield.eval.metrics import Metric, with_outcomes
 from rss_shield.eval.runs.points import metric_named
+from rss_shield.eval.runs.tables import plain
 from rss_shield.eval.stats import clopper_pearson
+from rss_shield.eval.table import rounded
 
 
 def of_run(episodes: pd.DataFrame, summary: pd.DataFrame, compared: pd.DataFrame) -> list[str]:
@@ -16,10 +19,11 @@ def of_run(episodes: pd.DataFrame, summary: pd.DataFrame, compared: pd.DataFrame
       compared: as of `eval.paper.compared.comparisons`.
     """
     outcomes = with_outcomes(episodes)
-    seeds, cells = episodes["train_seed"].nunique(), summary[["train", "test"]].drop_duplicates()
+    cells = len(summary[["train", "test"]].drop_duplicates())
+    seeds = episodes.loc[~episodes["train"].map(_is_scripted), "train_seed"].nunique()
+    over = f", {seeds} training seed{'s' if seeds > 1 else ''}" if seeds else ""
     paragraphs = [
-        f"{len(cells)} cells (an arm, tested one way), {len(episodes)} test episodes, {seeds} training "
-        f"seed{'s' if seeds > 1 else ''}."
+        f"{cells} cell{'s' if cells > 1 else ''} (an arm, tested one way), {len(episodes)} test episodes{over}."
     ]
     for test, where in (("on", "with the shield on"), ("off", "with the shield off")):
         tested = outcomes[outcomes["test"] == test]
@@ -49,6 +53,11 @@ def of_run(episodes: pd.DataFrame, summary: pd.DataFrame, compared: pd.DataFrame
             "chance (McNemar, p < 0.05 after Holm's correction; over episodes of these models, not over seeds)."
         )
     return paragraphs
+
+
+def _is_scripted(train: str) -> bool:
+    arm = arm_called(train)
+    return arm is not None and arm.scripted
 
 
 def _faults(tested: pd.DataFrame, where: str) -> str:
@@ -84,18 +93,29 @@ def of_sweep(
       axes: columns that tell points apart.
       groups: label and rows of the points that compete.
     """
-    paragraphs, x, y = [], metric_named(performance).label, metric_named(safety).label
+    paragraphs, across, up = [], metric_named(performance), metric_named(safety)
+    x, y = across.label, up.label
     for label, rows in groups:
         points = table.iloc[rows]
         where = f"{label}: " if label else ""
-        front = points[points["front"]].sort_values(performance, ascending=False)
+        front = points[points["front"]].sort_values(performance, ascending=across.less_is_better)
         if front.empty:
             paragraphs.append(f"{where}None of {len(points)} points has both {x} and {y}.")
             continue
         best = front.iloc[0]
-        named = ", ".join(f"{name} = {best[name]}" for name in axes)
+        reached, paid = _told(across, best[performance]), _told(up, best[safety])
+        if len(points) == 1:
+            paragraphs.append(f"{where}One point: {x} {reached}, {y} {paid}.")
+            continue
+        named = f" ({', '.join(f'{name} = {plain(best[name])}' for name in axes)})" if axes else ""
         paragraphs.append(
             f"{where}{len(front)} of {len(points)} points are on the Pareto front of {y} and {x}. "
-            f"The best {x} there is {best[performance]:.3g}, with {y} {best[safety]:.3g} ({named})."
+            f"The best {x} there is {reached}, with {y} {paid}{named}."
         )
     return paragraphs
+
+
+def _told(metric: Metric, value: float) -> str:
+    """As tables have it: 0.075 of a rate is 8 %."""
+    limits = tuple(metric.scale * limit for limit in metric.limits)
+    return f"{rounded(metric.scale * value, metric.digits, limits)} {metric.unit}".strip()

@@ -1,13 +1,13 @@
 """An experiment is a file that names environments, arms or policies, seeds, budgets, tests, and what is varied."""
 
-import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rss_shield.eval.config_option import read_config
+from rss_shield.eval.config_option import as_text, read_config
+from rss_shield.eval.files import NAMES, valid_name
 from rss_shield.eval.runs.names import check_names, flat
 
 DIRECTIONS = ("minimize", "maximize")
@@ -38,7 +38,7 @@ class Experiment:
     Every combination of environment, arm or policy, point of `list`, values of `grid`, and seed is a task.
     """
 
-    name: str
+    name: str  # of folders, so as every system takes it
     about: str = ""
     environments: tuple[str, ...] = ("highway-fast-v0",)
     arms: tuple[str, ...] = ()  # of train.py; or
@@ -108,8 +108,11 @@ def experiment_of(given: Mapping[str, Any]) -> Experiment:
     for name, values in {"seeds": seeds, **texts}.items():
         if len(set(values)) < len(values):
             raise ValueError(f"{name} = {list(values)}: something is named twice")
+    name = valid_name(str(given["name"]))
+    if not name:
+        raise ValueError(f"name = {given['name']!r}: expected {NAMES}")
     return Experiment(
-        name=str(given["name"]),
+        name=name,
         about=" ".join(str(given.get("about", "")).split()),
         environments=texts["environments"] or Experiment.environments,
         arms=texts["arms"],
@@ -139,8 +142,8 @@ def as_words(options: Mapping[str, Any]) -> list[str]:
     words = []
     for name, value in options.items():
         flag = name.replace("_", "-")
-        if name.startswith(("config.", "hyperparameters.")) and not isinstance(value, str):
-            words += [f"--{flag}", json.dumps(value)]
+        if isinstance(value, dict) or name.startswith(("config.", "hyperparameters.")):
+            words += [f"--{flag}", as_text(value)]
             continue
         if isinstance(value, bool) and not name.startswith("rules."):
             words.append(f"--{flag}" if value else f"--no-{flag}")

@@ -12,8 +12,8 @@ from rss_shield.eval.stats import (
     bootstrap_mean,
     bootstrap_median,
     clopper_pearson,
-    cluster_bootstrap,
     pareto_front,
+    pooled_bootstrap,
 )
 
 
@@ -52,10 +52,10 @@ def point_row(
       pooled: seeds only name more episodes of one fixed policy; nothing was trained.
 
     Returns:
-      Rows of the point's columns and metric, value, low, high, n, over: with one seed the interval is over episodes
-      (rates: Clopper-Pearson), else over seeds and episodes (`eval.stats.cluster_bootstrap`).
+      Rows of the point's columns and metric, value, low, high, n, over: values are means or medians of the episodes of
+      all seeds, as in `eval.metrics.summarise`. With one seed the interval is over episodes (rates: Clopper-Pearson),
+      else over seeds and episodes (`eval.stats.pooled_bootstrap`). Equal values of two metrics have equal intervals.
     """
-    rng = np.random.default_rng(0)
     tables = [with_outcomes(frame) for frame in episodes.values()]
     if pooled:
         tables = [pd.concat(tables, ignore_index=True)]
@@ -63,7 +63,7 @@ def point_row(
     rows = []
     for metric in metrics_in(names):
         samples = [table[metric.name].astype(float).dropna().to_numpy() for table in tables]
-        rows.append({**point, "metric": metric.name, **_interval(metric, samples, rng)._asdict()})
+        rows.append({**point, "metric": metric.name, **_interval(metric, samples, np.random.default_rng(0))._asdict()})
     return rows
 
 
@@ -71,7 +71,7 @@ def _interval(metric: Metric, samples: list[np.ndarray], rng: np.random.Generato
     known = [sample for sample in samples if sample.size]
     if len(known) > 1:
         statistic = np.median if metric.statistic == "median" else np.mean
-        interval = cluster_bootstrap(known, rng, statistic)
+        interval = pooled_bootstrap(known, rng, statistic)
         low, high = max(interval.low, metric.limits[0]), min(interval.high, metric.limits[1])
         if metric.statistic == "rate":  # seeds that agree, as in no crash at all, know no more than their episodes
             pooled = np.concatenate(known)

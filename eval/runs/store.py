@@ -11,6 +11,7 @@ from rss_shield.eval.runs.tasks import Task
 Files = dict[str, bytes]  # name -> content
 TASK = "task.json"
 ERROR = "error.txt"  # in the folder of a task that failed: its traceback
+FAILED = "failed.json"  # of a sweep: which of its tasks failed, and of what, a text each
 
 
 class Store:
@@ -46,3 +47,25 @@ class Store:
 
     def config(self, task: Task) -> dict:
         return json.loads((self.path(task) / TASK).read_text(encoding="utf-8"))
+
+
+def missing_in(folder: Path) -> str:
+    """A sentence that names the tasks of a sweep that failed, and of what; empty where none did.
+
+    Args:
+      folder: of the sweep. An older one has not recorded which they are, so they are named by their folders.
+    """
+    if (folder / FAILED).exists():
+        failed = json.loads((folder / FAILED).read_text(encoding="utf-8"))
+    else:
+        errors = [path for path in sorted((folder / "tasks").glob(f"*/{ERROR}")) if not (path.parent / TASK).exists()]
+        failed = [f"{path.parent.name} ({last_line(path.read_text(encoding='utf-8'))})" for path in errors]
+    if not failed:
+        return ""
+    tasks = "One task" if len(failed) == 1 else f"{len(failed)} tasks"
+    return f"{tasks} failed, and the points that need them are missing: {'; '.join(failed)}."
+
+
+def last_line(error: str) -> str:
+    """Of a traceback: what was raised."""
+    return error.strip().splitlines()[-1]

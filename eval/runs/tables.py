@@ -14,6 +14,7 @@ from rss_shield.eval.files import atomic, write_text
 from rss_shield.eval.metrics import Metric
 from rss_shield.eval.plots import STYLE
 from rss_shield.eval.runs.points import APART, groups_of, metric_named, with_front
+from rss_shield.eval.runs.store import missing_in
 from rss_shield.eval.table import markdown, rounded
 
 SHOWN = ("crash", "at_fault", "success", "return", "own_return", "speed", "override_share", "rms_jerk", "min_ttc")
@@ -47,7 +48,7 @@ def shown_metrics(table: pd.DataFrame, safety: str, performance: str) -> list[Me
 
 def texts(table: pd.DataFrame, axes: list[str], metrics: list[Metric]) -> pd.DataFrame:
     """The same as it is printed: "3.1 [2.8, 3.4]"; a star where nothing beats a point in both metrics."""
-    frame = pd.DataFrame({name: table[name].map(_plain) for name in axes})
+    frame = pd.DataFrame({name: table[name].map(plain) for name in axes})
     for metric in metrics:
         heading = f"{metric.label} [{metric.unit}]" if metric.unit else metric.label
         limits = tuple(metric.scale * limit for limit in metric.limits)
@@ -61,7 +62,8 @@ def texts(table: pd.DataFrame, axes: list[str], metrics: list[Metric]) -> pd.Dat
     return frame
 
 
-def _plain(value: Any) -> str:
+def plain(value: Any) -> str:
+    """A value of an axis, a number in at most four digits."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
@@ -70,22 +72,32 @@ def markdown_of(frame: pd.DataFrame) -> str:
 
 
 def write_points(folder: Path, points: pd.DataFrame, axes: list[str], safety: str, performance: str, title: str) -> str:
-    """Write points.csv, table.md, pareto.png and pareto.pdf; returns the table."""
+    """Write points.csv, table.md, pareto.png and pareto.pdf; returns the table.
+
+    Args:
+      folder: of the sweep, whose tasks that failed table.md names.
+    """
     table = with_front(wide(points, axes), safety, performance)
     with atomic(folder / "points.csv") as temporary:
         points.to_csv(temporary, index=False)
     text = markdown_of(texts(table, axes, shown_metrics(table, safety, performance)))
-    over = ", ".join(sorted(set(points["over"])))
     note = (
-        f"[low, high]: 95 % intervals over {over}; ★: no other point of its panel is as good in both "
+        f"{intervals_of(points)}; ★: no other point of its panel is as good in both "
         f"{metric_named(safety).label} and {metric_named(performance).label} and better in one."
     )
-    write_text(folder / "table.md", f"{title}\n\n{text}\n\n{note}\n")
+    missing = missing_in(folder)
+    write_text(folder / "table.md", "\n\n".join([title, text, note, *([missing] if missing else [])]) + "\n")
     figure = plot_front(table, axes, safety, performance, title)
     for kind in ("png", "pdf"):
         with atomic(folder / f"pareto.{kind}") as temporary:
             figure.savefig(temporary, format=kind, metadata={"CreationDate": None} if kind == "pdf" else None)
     return text
+
+
+def intervals_of(points: pd.DataFrame) -> str:
+    """What values and their intervals are about."""
+    over = ", ".join(sorted(set(points["over"])))
+    return f"Means (min TTC and the like: medians) of episodes of all seeds; [low, high]: 95 % intervals over {over}"
 
 
 def plot_front(table: pd.DataFrame, axes: list[str], safety: str, performance: str, title: str) -> Figure:
@@ -148,7 +160,7 @@ def labels_of(front: pd.DataFrame, axes: list[str], x: Metric, y: Metric) -> lis
     span = [max(high - low, 1e-12) for low, high in ends]
     places: list[tuple[tuple[float, float], list[str]]] = []
     for _, row in front.iterrows():
-        here, text = (float(row[x.name]), float(row[y.name])), "\n".join(_plain(row[name]) for name in axes)
+        here, text = (float(row[x.name]), float(row[y.name])), "\n".join(plain(row[name]) for name in axes)
         near = [
             texts
             for there, texts in places

@@ -5,7 +5,7 @@ Two levels of chance are kept apart. *Episodes*: the agents are given, other tes
 """
 
 from rss_shield.eval.stats.censored import completion_weights, weighted_mean, weighted_rate
-from rss_shield.eval.stats.clusters import cluster_bootstrap, cluster_difference
+from rss_shield.eval.stats.clusters import cluster_bootstrap, cluster_difference, pooled_bootstrap
 from rss_shield.eval.stats.corrections import benjamini_hochberg, holm
 from rss_shield.eval.stats.interval import EPISODES, RUNS, SEEDS, Interval
 from rss_shield.eval.stats.means import MANY, bootstrap_mean, bootstrap_median, paired_difference, student
@@ -38,6 +38,7 @@ __all__ = [
     "paired_difference",
     "pareto_front",
     "performance_profile",
+    "pooled_bootstrap",
     "probability_of_improvement",
     "student",
     "weighted_mean",

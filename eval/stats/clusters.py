@@ -41,9 +41,7 @@ def cluster_bootstrap(
     Raises:
       ValueError: a seed without episodes.
     """
-    samples = [np.asarray(sample, float) for sample in seeds]
-    if not all(sample.size for sample in samples):
-        raise ValueError(f"episodes per seed = {[sample.size for sample in samples]}: expected at least 1 each")
+    samples = _samples(seeds)
     count = len(samples)
     if count == 0:
         return Interval(np.nan, np.nan, np.nan, 0, SEEDS)
@@ -56,7 +54,54 @@ def cluster_bootstrap(
         here = drawn == s
         episodes = rng.integers(sample.size, size=(int(here.sum()), sample.size))
         values[here] = statistic(sample[episodes], axis=-1)
-    error = float(values.mean(axis=1).std()) * np.sqrt(count / (count - 1))
+    return _student(value, values.mean(axis=1), count, confidence)
+
+
+def pooled_bootstrap(
+    seeds: Sequence[ArrayLike],
+    rng: np.random.Generator,
+    statistic: Statistic = np.mean,
+    confidence: float = 0.95,
+    resamples: int = RESAMPLES,
+) -> Interval:
+    """A statistic of the episodes of all training seeds together, with an interval over seeds and episodes.
+
+    As `cluster_bootstrap`, but an episode weighs the same whichever seed it is of. For means of equally many episodes
+    per seed both are the same; the median of all episodes is not the mean of the seeds' medians.
+
+    Args:
+      seeds: S samples, `[K_s]` episodes each.
+      rng: draws the resamples.
+      statistic: of the last axis.
+
+    Returns:
+      n is the number of seeds. Bounds are NaN for fewer than two.
+
+    Raises:
+      ValueError: a seed without episodes.
+    """
+    samples = _samples(seeds)
+    count = len(samples)
+    if count < 2 or (statistic is np.mean and len({sample.size for sample in samples}) == 1):
+        return cluster_bootstrap(samples, rng, statistic, confidence, resamples)
+    value = float(statistic(np.concatenate(samples), axis=-1))
+    drawn = rng.integers(count, size=(resamples, count))
+    values = [
+        statistic(np.concatenate([rng.choice(samples[s], samples[s].size) for s in row]), axis=-1) for row in drawn
+    ]
+    return _student(value, np.asarray(values, float), count, confidence)
+
+
+def _samples(seeds: Sequence[ArrayLike]) -> list[np.ndarray]:
+    samples = [np.asarray(sample, float) for sample in seeds]
+    if not all(sample.size for sample in samples):
+        raise ValueError(f"episodes per seed = {[sample.size for sample in samples]}: expected at least 1 each")
+    return samples
+
+
+def _student(value: float, resampled: np.ndarray, count: int, confidence: float) -> Interval:
+    """Student's t around a value, by the standard error that resamples of `count` seeds give."""
+    error = float(resampled.std()) * np.sqrt(count / (count - 1))
     reach = float(stats.t.ppf(0.5 + confidence / 2, count - 1)) * error
     return Interval(value, value - reach, value + reach, count, SEEDS)
 

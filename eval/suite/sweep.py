@@ -11,7 +11,7 @@ same command goes on. Results do not depend on backend and workers.
 import io
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -24,9 +24,9 @@ from rss_shield.eval.metrics import with_outcomes
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.run_folder import versions
 from rss_shield.eval.runs.backends import Outcome, Work, run_tasks
-from rss_shield.eval.runs.experiment import Experiment, read_experiment
+from rss_shield.eval.runs.experiment import Experiment, as_words, read_experiment
 from rss_shield.eval.runs.points import check_there, metric_named, point_row
-from rss_shield.eval.runs.store import ERROR, Files, Store
+from rss_shield.eval.runs.store import ERROR, FAILED, Files, Store, last_line
 from rss_shield.eval.runs.tables import write_points
 from rss_shield.eval.runs.tasks import Task, samples_of, tasks_of
 from rss_shield.eval.suite.policies import check_policy
@@ -124,12 +124,8 @@ class Sweep:
 
     def why(self, outcome: Outcome) -> str:
         """One line: which task failed, of what, and where more is said."""
-        config = outcome.task.config
-        player = config["arm"] if "arm" in config else config["policy"]
-        what = [str(config["environment"]), str(player), f"seed {config['seed']}"]
-        setting = [f"{name} = {value}" for name, value in outcome.task.point.items() if name not in ROLES]
-        path, last = self.store.path(outcome.task) / ERROR, outcome.error.strip().splitlines()[-1]
-        return f"task {', '.join([*what, *setting])} failed: {last} (all of it: {path})"
+        path = self.store.path(outcome.task) / ERROR
+        return f"task {described(outcome.task)} failed: {last_line(outcome.error)} (all of it: {path})"
 
     def _ask_optuna(self) -> None:
         """Let Optuna's TPE choose, a batch at a time. Asked again, it chooses the same, so nothing is run twice."""
@@ -188,6 +184,14 @@ class Sweep:
         return pd.DataFrame(rows)
 
 
+def described(task: Task) -> str:
+    """Which one it is, in words."""
+    config = task.config
+    player = config["arm"] if "arm" in config else config["policy"]
+    setting = [f"{name} = {value}" for name, value in task.point.items() if name not in ROLES]
+    return ", ".join([str(config["environment"]), str(player), f"seed {config['seed']}", *setting])
+
+
 def _suggest(trial: Any, name: str, space: Any) -> Any:
     if hasattr(space, "low"):
         return trial.suggest_float(name, space.low, space.high, log=space.log)
@@ -214,11 +218,13 @@ def check_tasks(tasks: list[Task]) -> None:
             check_played(task.config["environment"], task.config["policy"], task.config["options"])
 
 
-def sweep(experiment: Experiment, folder: Path, work: Work = do_task, file: str = "", **run: Any) -> Sweep:
+def sweep(
+    experiment: Experiment, folder: Path, work: Work = do_task, file: str = "", options: Sequence[str] = (), **run: Any
+) -> Sweep:
     """Run an experiment and write its points.
 
     Args:
-      file: the experiment's own, which pages name to do it again.
+      file, options: of the command line that asked for it, which pages print to do it again.
       run: backend, workers and address of `run_tasks`.
 
     Raises:
@@ -227,10 +233,12 @@ def sweep(experiment: Experiment, folder: Path, work: Work = do_task, file: str 
     for name in metrics_of(experiment):
         metric_named(name)
     folder.mkdir(parents=True, exist_ok=True)
-    for warning in _record(experiment, folder, file):
+    for warning in _record(experiment, folder, {"file": file, "options": list(options)}):
         print(f"rss-shield sweep: warning: {warning}", file=sys.stderr)
     under_way = Sweep(experiment, folder, work, **run)
     under_way.run()
+    failed = [f"{described(outcome.task)} ({last_line(outcome.error)})" for outcome in under_way.failed]
+    write_json(folder / FAILED, failed)
     points = under_way.points(under_way.tasks)
     if len(points):
         axes = [name for name in points.columns if name not in ("metric", "value", "low", "high", "n", "over")]
@@ -268,7 +276,7 @@ def checked_workers(workers: int) -> int:
     return workers
 
 
-def _record(experiment: Experiment, folder: Path, file: str) -> list[str]:
+def _record(experiment: Experiment, folder: Path, asked: Mapping[str, Any]) -> list[str]:
     """Write the experiment and the versions beside its results; says what changed since the first task.
 
     Raises:
@@ -279,7 +287,7 @@ def _record(experiment: Experiment, folder: Path, file: str) -> list[str]:
     path, now = folder / "experiment.json", json.loads(to_json(versions()))
     begun = path.exists() and any((folder / "tasks").glob("[!.]*"))
     before = json.loads(path.read_text(encoding="utf-8")) if begun else {"versions": now}
-    write_json(path, {"experiment": asdict(experiment), "file": file, "versions": before["versions"]})
+    write_json(path, {"experiment": asdict(experiment), **asked, "versions": before["versions"]})
     changed = [name for name in now if name in before["versions"] and now[name] != before["versions"][name]]
     return [
         f"{name} is not what it was when the first task of {folder} ran: remove the folder to run all anew"
@@ -291,11 +299,13 @@ def run(arguments: list[str]) -> None:
     """What a command line asks for."""
     given = tyro.cli(Arguments, prog="rss-shield sweep", description=__doc__, args=arguments)
     try:
-        experiment = with_budget(read_experiment(given.experiment), given.episodes, given.total_timesteps)
+        budget = {"episodes": given.episodes, "total_timesteps": given.total_timesteps}
+        experiment = with_budget(read_experiment(given.experiment), **budget)
         done = sweep(
             experiment,
             given.runs_dir / experiment.name,
             file=str(given.experiment),
+            options=as_words({name: value for name, value in budget.items() if value is not None}),
             backend=given.backend,
             workers=checked_workers(given.workers),
             address=given.address,

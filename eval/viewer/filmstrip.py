@@ -79,7 +79,7 @@ def draw(traces: Sequence[Trace], labels: Sequence[str], title: str) -> Figure:
 
 
 def write_filmstrip(traces: Sequence[Trace], labels: Sequence[str], path: Path, title: str) -> None:
-    """Write `path` with the endings .png and .pdf."""
+    """Write `path`, whose ending is another, with the endings .png and .pdf."""
     save(draw(traces, labels, title), path.with_suffix(""))
 
 

@@ -142,6 +142,11 @@ def test_a_task_that_fails_says_so_in_one_line_and_is_done_again(tmp_path, monke
     (line,) = [line for line in said.err.splitlines() if line.startswith("rss-shield sweep: ")]
     assert "broken_driver:drive, seed 0 failed: " in line and "NameError: name 'sped' is not defined" in line
     assert path.parent.name in line and "Traceback" in path.read_text()
+    (failed,) = json.loads((tmp_path / "runs" / "e" / "failed.json").read_text())
+    assert (
+        failed
+        == "highway-fast-v0, broken_driver:drive, seed 0 (" + line.split("failed: ")[1].split(" (all of")[0] + ")"
+    )
     with pytest.raises(SystemExit):
         main(["sweep", "e.yaml"])  # what failed is not taken for done
 
@@ -202,6 +207,19 @@ def test_samples_are_in_their_ranges_and_the_same_again():
     # half of a logarithmic range lies below the geometric mean of its ends, 0.447
     assert 15 <= sum(time < 0.447 for time in times) <= 35
     assert {sample["entry"] for sample in samples} == {"cautious", "priority"}
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [("mein versuch (2)", "mein-versuch-2"), ("mein/versuch: 2", "mein-versuch-2"), ("größer 2.1", "größer-2.1")],
+)
+def test_a_name_is_made_one_that_a_folder_may_have(given, name):
+    assert experiment_of(LEAST | {"name": given}).name == name
+
+
+def test_a_name_of_no_letters_is_refused():
+    with pytest.raises(ValueError, match=r"name = ' - ': expected letters, digits and"):
+        experiment_of(LEAST | {"name": " - "})
 
 
 @pytest.mark.parametrize(

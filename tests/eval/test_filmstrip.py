@@ -39,6 +39,13 @@ def test_margins_are_gaps_less_what_is_required():
     assert margins_of(ego)[0, k] == pytest.approx(20.0 - (15.0 + 100.0 / 8.0))
 
 
+def test_names_with_dots_are_told_apart(tmp_path):
+    for penalty in ("0.1", "0.25"):
+        write_filmstrip([cut_in(brakes=True)], ["on"], tmp_path / f"penalty-{penalty}-typical.html", "a cut-in")
+    names = [f"penalty-{penalty}-typical.{kind}" for penalty in ("0.1", "0.25") for kind in ("pdf", "png")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+
+
 def test_a_strip_per_trace_is_drawn_and_written(tmp_path):
     traces = [cut_in(brakes=False), cut_in(brakes=True)]
     figure = draw(traces, ["shield off", "shield on"], "a cut-in")

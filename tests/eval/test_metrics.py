@@ -190,5 +190,15 @@ def test_differences_have_an_interval_over_seeds_too():
     assert row[["seed_low", "seed_high", "seeds"]].tolist() == pytest.approx([-0.484, 4.484, 3], abs=1e-3)
 
 
+def test_equal_values_of_two_metrics_have_equal_intervals():
+    baseline = episodes_of(["ego"] * 7 + [""] * 33)
+    changed = episodes_of(["ego"] * 2 + [""] * 38, test="on").assign(**{"return": np.arange(40) ** 2.0})
+    episodes = pd.concat([baseline, changed]).assign(rms_jerk=lambda rows: rows["return"])
+    for table in (summarise(episodes), differences(episodes)):
+        rows = table.drop(columns=["train"]).set_index(["test", "metric"]).loc["on"]
+        assert rows.loc["return"].equals(rows.loc["rms_jerk"])
+        assert rows.loc["crash"].equals(rows.loc["at_fault"])
+
+
 def test_one_cell_alone_has_no_differences():
     assert differences(episodes_of(["ego"])).empty

@@ -3,6 +3,8 @@
 import json
 import re
 import shutil
+from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,7 @@ from result_tables import episodes_of
 from rss_shield.eval.metrics import summarise
 from rss_shield.eval.paper.command import run, write
 from rss_shield.eval.paper.compared import as_texts, comparisons
-from rss_shield.eval.paper.read import file_of, scores_of
+from rss_shield.eval.paper.read import file_of, scores_of, sweep_command
 from rss_shield.eval.paper.render import escaped
 from rss_shield.eval.run_folder import versions
 
@@ -38,6 +40,7 @@ def folder(tmp_path):
     config = {
         "env_id": "highway-fast-v0",
         "arms": ["unshielded", "shielded"],
+        "rules": {"memory": False},
         "seeds": [0, 1, 2],
         "total_timesteps": 1000,
         "parameters": {},
@@ -78,6 +81,13 @@ def test_differences_are_paired_tested_and_corrected():
     assert "-55.0 [" in as_texts(comparisons(episodes()))["value [low, high]"][0]
 
 
+def test_equal_outcomes_differ_by_equal_intervals():
+    blames = {"off": ["ego"] * 12 + [""] * 8, "on": ["ego"] * 3 + [""] * 17}
+    frames = [episodes_of(blame, test, "on").assign(train_seed=k) for test, blame in blames.items() for k in range(3)]
+    rows = comparisons(pd.concat(frames, ignore_index=True)).set_index("metric")
+    assert rows.loc["crash", ["low", "high"]].equals(rows.loc["at_fault", ["low", "high"]])
+
+
 def test_who_learns_nothing_is_compared_with_every_seed():
     frame = episodes()
     scripted = episodes_of([""] * 20, "lazy", "on")
@@ -107,6 +117,8 @@ def test_the_report_says_what_came_out_and_needs_no_network(folder, tmp_path):
     summary = summarise(episodes()).set_index(["train", "test", "metric"])["value"]
     best = summary.xs("return", level="metric").max()
     assert f"Highest return: trained with the shield, tested with it on, {best:.1f} per episode." in page
+    assert "PPO on highway-fast-v0, RSS preset auto (rules.memory False), 1000 timesteps per arm, no interv" in page
+    assert "rss-shield train --env-id highway-fast-v0 --total-timesteps 1000 --seeds 0 1 2" in page
     assert not re.search(r"(src|href)=\"(?!data:|#)", page)
     assert page.count("<img ") == page.count("data:image/png;base64,") == 4
     markdown = (tmp_path / "report" / "report.md").read_text()
@@ -116,6 +128,44 @@ def test_the_report_says_what_came_out_and_needs_no_network(folder, tmp_path):
     for name in re.findall(r"\\includegraphics\[.*?\]\{(.*?)\}", latex):
         assert (tmp_path / "report" / name).exists()
     assert latex.count(r"\begin{tabular}") == latex.count(r"\end{tabular}") == 4
+
+
+def test_links_are_valid_whatever_folders_are_called(folder, tmp_path, monkeypatch):
+    runs = [tmp_path / "mein versuch (ä_1)", tmp_path / "b" / "mein versuch (ä_1)", tmp_path / "roads"]
+    for copy in runs:
+        shutil.copytree(folder, copy)
+        (copy / "pages").mkdir()
+        (copy / "pages" / "my drive-worst.html").write_text("")
+    monkeypatch.chdir(runs[0])
+    out = tmp_path / "a report"
+    page = write((Path("."), *runs[1:]), out, "Odd names").read_text()
+    markdown, latex = (out / "report.md").read_text(), (out / "report.tex").read_text()
+    links = re.findall(r"\]\((.*?)\)", markdown)
+    assert all(re.fullmatch(r"[\w.%/-]+", link, re.ASCII) and (out / unquote(link)).exists() for link in links)
+    assert len(links) == len(set(links)) == 3 * (4 + 1)
+    assert all((out / unquote(link)).exists() for link in re.findall(r'<a href="([^#].*?)"', page))
+    paths = re.findall(r"\\includegraphics\[.*?\]\{(.*?)\}", latex)
+    assert len(paths) == 12 and all((out / path).exists() for path in paths)
+    labels = re.findall(r"\\label\{(.*?)\}", latex)
+    assert len(labels) == len(set(labels)) and all(re.fullmatch(r"[\w:./-]+", label, re.ASCII) for label in labels)
+    assert "## highway-fast-v0 (mein versuch (ä_1))" in markdown
+
+
+def test_code_without_a_commit_is_said_so(folder, tmp_path):
+    record = json.loads((folder / "config.json").read_text())
+    (folder / "config.json").write_text(json.dumps({**record, "git_commit": None, "git_changes": None}))
+    page = write((folder,), tmp_path / "report", "Installed").read_text()
+    assert "a-run: code without a commit; Python" in page and "None" not in page.split("<footer>")[1]
+
+
+def test_where_nobody_learns_there_are_no_training_seeds(folder, tmp_path):
+    record = json.loads((folder / "config.json").read_text())
+    record["config"] |= {"arms": ["lazy"], "rules": {}}
+    (folder / "config.json").write_text(json.dumps(record))
+    episodes_of(["ego"] * 3 + [""] * 17, "lazy", "on").to_csv(folder / "episodes.csv", index=False)
+    page = write((folder,), tmp_path / "report", "Scripted").read_text()
+    assert "<p>Drivers on highway-fast-v0, RSS preset auto, nobody learns.</p>" in page
+    assert "<p>1 cell (an arm, tested one way), 20 test episodes.</p>" in page
 
 
 def test_roads_together_have_profiles(folder, tmp_path):
@@ -162,10 +212,13 @@ def test_the_file_of_a_sweep_is_that_which_was_called(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     record = {"experiment": {"name": "pol"}}
     assert file_of(record) == "pol.yaml" and file_of({**record, "file": "mine/pol.toml"}) == "mine/pol.toml"
+    asked = {**record, "file": "mein versuch.yaml", "options": ["--episodes", "20"]}
+    assert sweep_command(asked) == "rss-shield sweep 'mein versuch.yaml' --episodes 20"
 
 
 def test_latex_takes_every_sign():
     assert escaped("50 % of a_b & c – ★ m/s²") == r"50 \% of a\_b \& c -- $\star$ m/s$^2$"
+    assert escaped("~/a^b") == r"\textasciitilde{}/a\textasciicircum{}b"
 
 
 BROWSER = next(

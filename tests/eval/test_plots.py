@@ -6,6 +6,9 @@ import pytest
 from PIL import Image
 from result_tables import episodes_of
 
+from rss_shield.eval import frontier
+from rss_shield.eval.frontier import limits_of
+from rss_shield.eval.metrics import summarise
 from rss_shield.eval.plots import plot_blame, plot_learning_curve
 
 
@@ -64,3 +67,39 @@ def test_the_same_data_give_the_same_files(tmp_path):
         plot_blame(some_episodes(), tmp_path / name, "a road")
         pictures.append([(tmp_path / name / f"blame.{kind}").read_bytes() for kind in ("png", "pdf")])
     assert pictures[0] == pictures[1]
+
+
+def frontier_rows(*seeds: tuple[float, float]) -> pd.DataFrame:
+    values = np.arange(len(seeds), dtype=float)
+    frame = pd.DataFrame({"value": values, "low": values - 0.5, "high": values + 0.5})
+    return frame.assign(seed_low=[low for low, _ in seeds], seed_high=[high for _, high in seeds])
+
+
+def test_whiskers_of_the_frontier_are_within_its_axes():
+    low, high = limits_of(frontier_rows((-0.7, 0.7), (0.2, 1.8)), "return")
+    assert low < -0.7 and high > 1.8
+
+
+def test_an_interval_over_seeds_that_would_hide_the_points_is_cut_at_the_frame():
+    # over episodes -0.5 to 1.5; at most as much on either side, and a margin of 6 % of all
+    low, high = limits_of(frontier_rows((-50.0, 50.0), (np.nan, np.nan)), "return")
+    assert (low, high) == (pytest.approx(-2.5 - 0.36), pytest.approx(3.5 + 0.36))
+
+
+def test_where_nothing_is_known_an_axis_has_ends():
+    unknown = frontier_rows((np.nan, np.nan)).assign(value=np.nan, low=np.nan, high=np.nan)
+    assert limits_of(unknown, "crash") == (0.0, 1.0)
+    assert limits_of(unknown.iloc[:0], "crash") == (0.0, 1.0)
+
+
+@pytest.mark.slow
+def test_every_whisker_over_episodes_is_drawn_to_its_end(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(frontier, "save", lambda figure, stem: drawn.append(figure))
+    episodes = [episodes_of(["ego"] * (4 * k) + [""] * (30 - 4 * k), name, test)
+                for k, name in enumerate(("off", "on", "lazy")) for test in ("off", "on")]  # fmt: skip
+    frontier.plot_frontier(summarise(pd.concat(episodes, ignore_index=True)), tmp_path, "a road")
+    for axes in drawn[0].axes:
+        ends = np.concatenate([line for bars in axes.collections for line in bars.get_segments()])
+        for values, (low, high) in zip(ends.T, (axes.get_xlim(), axes.get_ylim()), strict=True):
+            assert low < values.min() and values.max() < high

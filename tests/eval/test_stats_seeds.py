@@ -19,6 +19,7 @@ from rss_shield.eval.stats import (
     mcnemar,
     pareto_front,
     performance_profile,
+    pooled_bootstrap,
     probability_of_improvement,
     student,
 )
@@ -58,6 +59,26 @@ def test_every_seed_weighs_the_same_however_many_episodes_it_has():
 def test_a_statistic_of_the_episodes_may_be_any():
     interval = cluster_bootstrap([[0, 1, 9], [2, 3, 99]], generator(), np.median)
     assert interval.value == 2.0
+
+
+def test_pooled_every_episode_weighs_the_same_whichever_seed_it_is_of():
+    assert pooled_bootstrap([[0.0], [1.0] * 9], generator()).value == 0.9
+    interval = pooled_bootstrap([[0, 1, 9], [2, 3, 99]], generator(), np.median)
+    assert interval.value == 2.5  # of 0, 1, 2, 3, 9, 99
+    assert interval.low < 2.5 < interval.high and interval.n == 2 and interval.over == SEEDS
+
+
+def test_pooled_means_of_equally_many_episodes_are_those_of_the_seeds():
+    seeds = generator(1).normal(0, 1, (4, 30))
+    assert pooled_bootstrap(seeds, generator()) == cluster_bootstrap(seeds, generator())
+
+
+def test_pooled_seeds_that_are_each_of_one_value_have_the_scatter_of_the_draws():
+    # 1 and 3 episodes of values 0 and 1: of 0-0, 0-1, 1-0, 1-1 the pooled means are 0, 3/4, 3/4, 1, whose standard
+    # deviation is sqrt(17/32 - 25/64) = 3/8; sqrt(2/1) wider, times t(1 degree) = 12.706
+    interval = pooled_bootstrap([[0.0], [1.0] * 3], generator(), resamples=20_000)
+    assert interval.value == 0.75
+    assert interval.high - 0.75 == pytest.approx(12.706 * math.sqrt(2) * 0.375, rel=0.02)
 
 
 def test_one_seed_says_nothing_about_others():

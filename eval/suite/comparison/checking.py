@@ -14,9 +14,9 @@ from rss_shield.envs.arguments import rules_of
 from rss_shield.envs.make_vec import BACKENDS
 from rss_shield.envs.options import PENALTIES, WAITING, Options
 from rss_shield.eval.arms import arm_named
+from rss_shield.eval.files import NAMES, valid_name
 from rss_shield.eval.own import function_named, is_own
 from rss_shield.eval.suite.comparison.making import wrapped
-from rss_shield.eval.suite.comparison.naming import NAMES, valid_name
 from rss_shield.eval.suite.comparison.options import FIRST_REMOVAL_SEED, FIRST_TEST_SEED, Config
 from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in
 from rss_shield.shield.junctions.memory import ENTRIES
