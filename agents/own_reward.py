@@ -1,5 +1,6 @@
 """A reward of one's own: what it is made of, and how an agent is paid by it."""
 
+import reprlib
 from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Any, NamedTuple
@@ -71,8 +72,13 @@ def rewards_by(
     """
     told = told_by(infos, ended)
     raw = np.asarray(told("raw_reward"), float)
-    paid = np.asarray(function(Decision(raw, np.asarray(actions), ended, told)), float)
+    answer = function(Decision(raw, np.asarray(actions), ended, told))
     name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', function)}"
+    try:
+        paid = np.asarray(answer, float)
+    except (TypeError, ValueError):  # texts, None among numbers, rows of unlike length
+        returned = f"{type(answer).__name__} {reprlib.repr(answer)}"
+        raise RewardFailed(f"reward {name}: returned {returned}; expected numbers, shape {raw.shape}") from None
     if paid.shape != raw.shape:
         raise RewardFailed(f"reward {name}: shape {paid.shape} for {len(raw)} environments; expected {raw.shape}")
     if not np.isfinite(paid).all():

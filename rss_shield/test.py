@@ -116,7 +116,7 @@ def main(arguments: list[str]) -> None:
         policy, config = policy_for(config, card)
         tests = tests_of(config, card)
         params = preset_of(config, card)
-        check_spaces(config, params, policy, next(iter(tests.values())))
+        policy = fitted(config, params, policy, next(iter(tests.values())))
         folder_for(config.out)
     except (ValueError, OSError, ImportError) as error:
         fail(PROGRAM, f"{type(error).__name__}: {error}" if isinstance(error, ImportError) else str(error))
@@ -264,12 +264,16 @@ def environments(config: Config, params: Any, shield: Mapping[str, Any], n_envs:
     return with_history(env, config.history)
 
 
-def check_spaces(config: Config, params: Any, policy: Tested, shield: Mapping[str, Any]) -> None:
-    """Does a model fit the environment, as it is in one of the tests?"""
+def fitted(config: Config, params: Any, policy: Tested, shield: Mapping[str, Any]) -> Tested:
+    """The policy for the environment, as it is in one of the tests: a function's actions are compared with those there.
+
+    Raises:
+      ValueError: a model that is made for other observations or actions.
+    """
     env = environments(config, params, shield, 1)
     env.close()
     if policy.spaces is None:
-        return
+        return Tested(driver_named(config.policy, config.one_by_one, env.single_action_space))
     observations, actions = policy.spaces
     for kind, model, here in (
         ("observations", observations.shape, env.single_observation_space.shape),
@@ -280,6 +284,7 @@ def check_spaces(config: Config, params: Any, policy: Tested, shield: Mapping[st
                 f"{config.policy}: made for {kind} {model}, but {config.env_id} has {here}; --env-id and "
                 "--config.observation... choose another environment"
             )
+    return policy
 
 
 def _size(space: gym.Space) -> Any:

@@ -30,6 +30,9 @@ def faster_one(observation):
 
 def one_for_all(observations):
     return 3
+
+def pairs(observations):
+    return np.zeros((len(observations), 2), int)
 """
 
 
@@ -140,7 +143,8 @@ def test_algorithms_that_share_a_policy_are_told_apart(tmp_path):
         ("no_module:drive", "no_module:drive: no module 'no_module'"),
         ("my_driver:drive", "my_driver:drive: module 'my_driver' has no 'drive'"),
         ("my_driver:number", "my_driver:number: int cannot be called; expected a function"),
-        ("my_driver:one_for_all", "returned an array of shape () for 3 observations; expected one action for each"),
+        ("my_driver:one_for_all", "returned int 3 for 3 observations; expected one whole number from 0 to 4 for each"),
+        ("my_driver:pairs", "my_driver:pairs: returned an array of shape (3, 2) and type int64, [[0, 0], [0, 0], "),
         ("my_driver:faster --tests of", "--tests of is out of range: expected some of off, on"),
         ("my_driver:faster --episodes 0", "--episodes 0 is out of range: expected at least 1"),
         ("my_driver:faster --backend slow", "--backend slow is out of range: expected one of fast, highway-env"),
