@@ -106,10 +106,11 @@ def _checked(
         actions = np.asarray(answer)
     except ValueError:  # rows of unlike length
         actions = np.asarray(None)
-    count, hint = len(observations), "" if one_by_one else "; `rss-shield test --one-by-one` takes functions of one"
-    if actions.ndim == 0 or len(actions) != count or not _are_of(actions, space):
+    alone = actions.ndim == 0 or len(actions) != len(observations)
+    if alone or not _are_of(actions, space):
+        hint = "; `rss-shield test --one-by-one` takes functions of one observation" * (alone and not one_by_one)
         raise OwnFailed(
-            f"{name}: returned {_told(actions, answer)} for {count} observation{'s' * (count != 1)}; expected "
+            f"{name}: returned {_told(actions, answer)} for {len(observations)} observations; expected "
             f"{_one_of(space)} for each{hint}"
         )
     return actions
