@@ -28,6 +28,7 @@ PACKAGES = (
     "stable-baselines3",
     "torch",
 )
+SOURCES = "sources."  # of a record: digests of what a user brought along, by name
 PAGES = "pages"  # folder in a run: episodes that play
 
 
@@ -71,15 +72,22 @@ def open_run(
     now = json.loads(to_json(provenance))
     changed = changes(now["config"], {**json.loads(to_json(dict(defaults))), **before["config"]})
     if changed:
-        raise ValueError(
-            f"{'; '.join(f'{field} = {new!r}, but {folder} was started with {old!r}' for field, new, old in changed)}; "
-            "give the same value, or --overwrite, or another --name"
-        )
+        raise ValueError(_refusal(changed, folder))
     return [
         f"{name} was {before.get(name)} when this run was started and is {now[name]} now"
         for name in now
         if name in before and name != "config" and before[name] != now[name]
     ]
+
+
+def _refusal(changed: list[tuple[str, Any, Any]], folder: Path) -> str:
+    """Why a run does not go on, and what to do: a digest of a file says nothing to who has edited it."""
+    edited = [field.removeprefix(SOURCES) for field, *both in changed if field.startswith(SOURCES) and all(both)]
+    values = [one for one in changed if not (one[0].startswith(SOURCES) and all(one[1:]))]
+    told = [f"{field} = {new!r}, but {folder} was started with {old!r}" for field, new, old in values]
+    told += [f"the file {'of ' * (':' in name)}{name} has been changed since {folder} was started" for name in edited]
+    ways = ["give the same value"] * bool(values) + ["put it back as it was"] * bool(edited)
+    return f"{'; '.join(told)}; {' and '.join(ways)}, or --overwrite starts it anew, or --name chooses another folder"
 
 
 def recorded(folder: Path) -> dict[str, Any] | None:
