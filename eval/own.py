@@ -151,8 +151,13 @@ def digests(values: Iterable[Any]) -> dict[str, str]:
     for name in dict.fromkeys(value for value in values if isinstance(value, str)):
         source = _source(name)
         if source is not None:
-            found[name] = hashlib.sha256(source.read_bytes()).hexdigest()[:16]
+            found[name] = digest_of(source)
     return found
+
+
+def digest_of(file: Path) -> str:
+    """What tells one state of a file from another."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
 
 
 def _source(name: str) -> Path | None:

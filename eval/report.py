@@ -20,7 +20,7 @@ from rss_shield.eval.frontier import plot_frontier
 from rss_shield.eval.metrics import differences, summarise
 from rss_shield.eval.plots import plot_blame, plot_learning_curve
 from rss_shield.eval.replay import compare, verdict
-from rss_shield.eval.run_folder import changes
+from rss_shield.eval.run_folder import given
 from rss_shield.eval.table import print_table, write_table
 
 _PLACE = {"line": "at the line", "anywhere": "anywhere"}
@@ -70,8 +70,8 @@ def write_report(folder: Path) -> None:
     )
     n_seeds = f"{len(seeds)} training seed" + ("s" if len(seeds) > 1 else "")
     title = (
-        f"{_who(arms)} on {config['env_id']}{_given('config', config['config'])}, RSS preset {config['preset']}"
-        f"{_given('ego', config['ego'])}{_given('other', config['other'])}, {_conduct(config)}"
+        f"{_who(arms)} on {config['env_id']}{given('config', config['config'])}, RSS preset {config['preset']}"
+        f"{given('ego', config['ego'])}{given('other', config['other'])}, {_conduct(config)}"
         f"{config['total_timesteps']} timesteps per arm, {_penalty(config)}, {n_seeds}"
     )
     for arm, seed in models:
@@ -93,12 +93,6 @@ def write_report(folder: Path) -> None:
 
 def _who(arms: Sequence[Arm]) -> str:
     return "PPO" if all(arm.learner == "ppo" for arm in arms) else "Agents"
-
-
-def _given(option: str, values: dict[str, Any]) -> str:
-    """What replaces the defaults of an environment or a preset: " (config.lanes_count 4)"; empty if nothing does."""
-    named = [f"{option}.{name} {value}" for name, value, _ in changes(values, {})]
-    return f" ({', '.join(named)})" if named else ""
 
 
 def _penalty(config: dict[str, Any]) -> str:

@@ -317,4 +317,5 @@ def test_the_test_command_takes_tables_parameters_and_rewards(tmp_path):
     record = json.loads(Path("o/config.json").read_text())["config"]
     assert record["parameters"]["ego"]["response_time"] == 0.5 and record["parameters"]["ego"]["mu"] == 0.3
     assert set(record["sources"]) == {"brought:drive", "brought:length", "mine.yaml"}
-    assert "own return" in Path("o/table.md").read_text()
+    table = Path("o/table.md").read_text()
+    assert "own return" in table and "preset mine.yaml (ego.mu 0.3), reward brought:length, 3 episodes" in table
