@@ -16,6 +16,7 @@ from rss_shield.agents.load import algorithm_in, load_policy
 from rss_shield.agents.vec_env import VectorEnvAdapter
 from rss_shield.eval.arms import OFF_AND_ON
 from rss_shield.eval.suite.tested import title_of
+from rss_shield.shield.params import Rules
 
 ENV = "highway-fast-v0"
 SMALL = ["--episodes", "3", "--config.duration", "6"]
@@ -138,8 +139,8 @@ RECORD = {
         ({"backend": "highway-env"}, ", backend highway-env, "),
         ({"first_seed": 7}, ", 1000 episodes from seed 7 on"),
         (
-            {"shield": {test: {**shield, "rules": {"memory": False}} for test, shield in OFF_AND_ON.items()}},
-            ", shield rules.memory False, ",
+            {"shield": {test: {**one, "rules": Rules(memory=False)._asdict()} for test, one in OFF_AND_ON.items()}},
+            "simulator, shield rules.memory False, 1000 episodes",
         ),
         ({"shield": {**OFF_AND_ON, "on": {"shield": "override", "filter": "cbf"}}}, ", test on: filter cbf, "),
     ],

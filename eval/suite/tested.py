@@ -8,6 +8,7 @@ from typing import Any
 from rss_shield.eval.arms import OFF_AND_ON
 from rss_shield.eval.files import to_json
 from rss_shield.eval.run_folder import changes, given, recorded, said
+from rss_shield.shield.params import Rules
 
 FIRST_SEED = 10**9  # as train.py's tests
 USUAL = {"reward": "", "entry": "cautious", "intent": "any", "waiting": "line", "history": 1, "backend": "fast"}
@@ -67,11 +68,14 @@ def title_of(record: Mapping[str, Any]) -> str:
 
 def _of_the_shield(tests: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Options beyond off and on: of all tests, then of single ones."""
-    each = {
-        test: [f"{name} {value}" for name, value, _ in changes(dict(options), dict(OFF_AND_ON.get(test, {})))]
-        for test, options in tests.items()
-    }
+    each = {test: _beyond(dict(options), dict(OFF_AND_ON.get(test, {}))) for test, options in tests.items()}
     common = [option for option in next(iter(each.values())) if all(option in options for options in each.values())]
     own = {test: [option for option in options if option not in common] for test, options in each.items()}
     texts = [f"shield {', '.join(common)}"] if common else []
     return texts + [f"test {test}: {', '.join(options)}" for test, options in own.items() if options]
+
+
+def _beyond(options: dict[str, Any], usual: dict[str, Any]) -> list[str]:
+    """Options with another value than usual; cards have all rules."""
+    differing = changes(options, {"rules": Rules()._asdict(), **usual})
+    return [f"{name} {value}" for name, value, _ in differing if value is not None]
