@@ -12,6 +12,7 @@ import sys
 from rss_shield.agents.own_reward import RewardFailed
 from rss_shield.command_line import fail
 from rss_shield.eval.arms import arm_named, table
+from rss_shield.eval.files import folder_for, refuse
 from rss_shield.eval.jobs import run_jobs
 from rss_shield.eval.own import OwnFailed
 from rss_shield.eval.report import cell_path, replay_path, write_report
@@ -35,6 +36,7 @@ def main(arguments: list[str]) -> None:
         config, folder = started(arguments, PROGRAM)
         preset = resolve(config)
         recorded = record(config, preset, tried(config, preset))
+        folder_for(config.runs_dir, "--runs-dir")
         warnings = open_run(
             folder,
             recorded,
@@ -44,7 +46,7 @@ def main(arguments: list[str]) -> None:
             command=words_of(config),
         )
     except (ValueError, OSError) as error:
-        fail(PROGRAM, str(error))
+        refuse(PROGRAM, error)
     for warning in warnings:
         print(f"{PROGRAM}: warning: {warning}", file=sys.stderr)
 

@@ -53,7 +53,22 @@ RANGES: dict[str, tuple[float, float, bool]] = {
     "exploration_final_eps": (0, 1, not _WHOLE),
 }
 KWARGS = "policy_kwargs"
-_BLOCKS_DEPEND_ON = ("policy", "n_steps", "train_freq")
+# arguments that are not free -> what decides them
+_ALWAYS = {
+    "policy": "it is MlpPolicy, --network and hyperparameters.policy_kwargs choose the network",
+    "seed": "--seeds says it",
+    "device": "--device says it",
+    "tensorboard_log": "the folder of the run is where it is written, see --tracker",
+}
+_WITH_ROLLOUTS = {
+    "n_steps": "a rollout is a fixed number of decisions that --n-envs environments share, and blocks, after which a "
+    "stopped training goes on, are whole rollouts; --n-envs and --total-timesteps decide it"
+}
+_WITH_BUFFER = {
+    "train_freq": "it is one step of all --n-envs environments, and blocks, after which a stopped training goes on, "
+    "are whole steps; gradient_steps says how much is learnt from each",
+    "n_steps": "it is 1, because environments begin anew with every block, and longer returns would go across",
+}
 _NO_HYPERPARAMETERS = ("seed", "device", "tensorboard_log", "verbose", "stats_window_size", "_init_setup_model")
 
 
@@ -83,12 +98,16 @@ class Learner(NamedTuple):
         """This learner with other arguments of its algorithm. A learning rate that falls begins at the one given.
 
         Raises:
-          ValueError: the algorithm has no such argument, or its value is out of range.
+          ValueError: the algorithm has no such argument, something else decides it, or its value is out of range.
         """
         if not changes:
             return self
-        known = {*self.defaults(), *self.options(1, 1)} - {*_BLOCKS_DEPEND_ON, *_NO_HYPERPARAMETERS}
+        arguments = {"policy", *self.defaults(), *self.options(1, 1)}
+        decided = {**_ALWAYS, **(_WITH_BUFFER if "train_freq" in arguments else _WITH_ROLLOUTS)}
+        known = arguments - {*decided, *_NO_HYPERPARAMETERS}
         for name, value in changes.items():
+            if name in decided and name in arguments:
+                raise ValueError(f"hyperparameters.{name} = {value!r}: not to be chosen here; {decided[name]}")
             if name not in known:
                 expected = ", ".join(sorted(known))
                 raise ValueError(f"hyperparameters.{name}: {self.algorithm.__name__} takes {expected}")

@@ -1,6 +1,7 @@
 """A reward of one's own: what it is made of, and how an agent is paid by it."""
 
 import copy
+import reprlib
 from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Any, NamedTuple
@@ -74,8 +75,13 @@ def rewards_by(
     raw = np.asarray(told("raw_reward"), float)
     # copies, all of them: a function may work in place
     decision = Decision(raw.copy(), np.array(actions), ended.copy(), lambda *keys: copy.copy(told(*keys)))
-    paid = np.asarray(function(decision), float)
+    answer = function(decision)
     name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', function)}"
+    try:
+        paid = np.asarray(answer, float)
+    except (TypeError, ValueError):  # texts, None among numbers, rows of unlike length
+        returned = f"{type(answer).__name__} {reprlib.repr(answer)}"
+        raise RewardFailed(f"reward {name}: returned {returned}; expected numbers, shape {raw.shape}") from None
     if paid.shape != raw.shape:
         raise RewardFailed(f"reward {name}: shape {paid.shape} for {len(raw)} environments; expected {raw.shape}")
     if not np.isfinite(paid).all():

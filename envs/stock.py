@@ -35,7 +35,8 @@ def make_stock(env_id: str, **kwargs: Any) -> gym.Env:
     """`gymnasium.make`, with a `TimeLimit` where there is no limit, and with drivers of its own (`Upkeep`).
 
     highway-env ends a merge when the ego is past it. An ego that has stopped behind a wreck never is.
-    That there is a later version of an environment asked for by its version is not said, once for each of a batch.
+    That there is a later version of an environment asked for by its version is not said, once for each of a batch; nor
+    which version is made where none is asked for.
 
     Raises:
       ValueError: an argument that the environment does not have, a bad `max_episode_steps`, a configuration that it
@@ -119,6 +120,7 @@ def _made(env_id: str, arguments: dict[str, Any]) -> gym.Env:
     _import_module_of(env_id)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*is out of date", DeprecationWarning)
+        warnings.filterwarnings("ignore", ".*Using the latest versioned environment", UserWarning)
         try:
             return gym.make(env_id, **arguments)
         except TypeError as error:

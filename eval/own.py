@@ -4,12 +4,14 @@ import functools
 import hashlib
 import importlib
 import os
+import reprlib
 import sys
 import traceback
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
 from rss_shield.eval.config_option import FILES
@@ -81,30 +83,63 @@ def _line_of(function: Callable[..., Any], error: Exception) -> str:
     return f" ({frames[-1].filename}, line {frames[-1].lineno}: {frames[-1].line})" if frames else ""
 
 
-def driver_named(name: str, one_by_one: bool = False) -> Driver:
-    """A policy: observations `[B, ...]` -> actions `[B]`.
+def driver_named(name: str, one_by_one: bool = False, actions: gym.Space | None = None) -> Driver:
+    """A policy: observations `[B, ...]` -> actions `[B, ...]`.
 
     Args:
       name: as for `function_named`.
       one_by_one: the function maps one observation to one action.
+      actions: what one action is taken from; None: only their number is looked at.
 
     Raises:
       ValueError: as `function_named`; when it drives, if it does not answer with one action for each observation.
     """
-    return functools.partial(_checked, blaming(function_named(name), name), name, one_by_one)
+    return functools.partial(_checked, blaming(function_named(name), name), name, one_by_one, actions)
 
 
-def _checked(function: Callable[..., Any], name: str, one_by_one: bool, observations: np.ndarray) -> np.ndarray:
+def _checked(
+    function: Callable[..., Any], name: str, one_by_one: bool, space: gym.Space | None, observations: np.ndarray
+) -> np.ndarray:
     """Its actions, if there is one for each observation."""
-    if one_by_one:
-        return np.array([function(observation) for observation in observations])
-    actions = np.asarray(function(observations))
-    if actions.ndim == 0 or len(actions) != len(observations):
+    answer = [function(observation) for observation in observations] if one_by_one else function(observations)
+    try:
+        actions = np.asarray(answer)
+    except ValueError:  # rows of unlike length
+        actions = np.asarray(None)
+    alone = actions.ndim == 0 or len(actions) != len(observations)
+    if alone or not _are_of(actions, space):
+        hint = "; `rss-shield test --one-by-one` takes functions of one observation" * (alone and not one_by_one)
         raise OwnFailed(
-            f"{name}: returned an array of shape {actions.shape} for {len(observations)} observations; expected one "
-            "action for each; `rss-shield test --one-by-one` takes functions of one observation"
+            f"{name}: returned {_told(actions, answer)} for {len(observations)} observations; expected "
+            f"{_one_of(space)} for each{hint}"
         )
     return actions
+
+
+def _are_of(actions: np.ndarray, space: gym.Space | None) -> bool:
+    """Has every one the shape and the kind of a space? Of other than numbers and rows of them nothing is said."""
+    if isinstance(space, gym.spaces.Discrete):
+        whole = actions.ndim == 1 and np.issubdtype(actions.dtype, np.integer)
+        return bool(whole and (actions >= space.start).all() and (actions < space.start + space.n).all())
+    if isinstance(space, gym.spaces.Box):
+        numbers = actions.dtype.kind in "iuf" and bool(np.isfinite(actions).all())
+        return numbers and actions.shape[1:] == space.shape
+    return True
+
+
+def _one_of(space: gym.Space | None) -> str:
+    if isinstance(space, gym.spaces.Discrete):
+        return f"one whole number from {space.start} to {space.start + space.n - 1}"
+    if isinstance(space, gym.spaces.Box):
+        return f"finite numbers of shape {space.shape}"
+    return "one action"
+
+
+def _told(array: np.ndarray, answer: Any) -> str:
+    """What came back, in a few words: the shape and the first of it."""
+    if array.ndim == 0:
+        return f"{type(answer).__name__} {reprlib.repr(answer)}"
+    return f"an array of shape {array.shape} and type {array.dtype}, {reprlib.repr(array[:3].tolist())}"
 
 
 def digests(values: Iterable[Any]) -> dict[str, str]:
@@ -116,8 +151,13 @@ def digests(values: Iterable[Any]) -> dict[str, str]:
     for name in dict.fromkeys(value for value in values if isinstance(value, str)):
         source = _source(name)
         if source is not None:
-            found[name] = hashlib.sha256(source.read_bytes()).hexdigest()[:16]
+            found[name] = digest_of(source)
     return found
+
+
+def digest_of(file: Path) -> str:
+    """What tells one state of a file from another."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
 
 
 def _source(name: str) -> Path | None:

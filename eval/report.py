@@ -20,7 +20,7 @@ from rss_shield.eval.frontier import plot_frontier
 from rss_shield.eval.metrics import differences, summarise
 from rss_shield.eval.plots import plot_blame, plot_learning_curve
 from rss_shield.eval.replay import compare, verdict
-from rss_shield.eval.run_folder import changes
+from rss_shield.eval.run_folder import given
 from rss_shield.eval.table import print_table, write_table
 
 USUAL_OPTIONS = {  # of `rss-shield train`, which a title names where they are others
@@ -105,11 +105,11 @@ def title_of(config: dict[str, Any]) -> str:
       config: of its record; what an older run lacks is as usual.
     """
     arms = [arm_named(name) for name in config["arms"]]
-    table = "".join(_given(option, config) for option in ("ego", "other", "rules"))
+    table = "".join(given(option, config.get(option, {})) for option in ("ego", "other", "rules"))
     unusual = [f"{name} {config[name]}" for name, usual in USUAL_OPTIONS.items() if config.get(name, usual) != usual]
     return ", ".join(
         [
-            f"{_who(arms)} on {config['env_id']}{_given('config', config)}",
+            f"{_who(arms)} on {config['env_id']}{given('config', config.get('config', {}))}",
             f"RSS preset {config.get('preset', 'auto')}{table}",
             *unusual,
             *_conduct(config),
@@ -122,7 +122,7 @@ def title_of(config: dict[str, Any]) -> str:
 def _learnt(config: dict[str, Any]) -> list[str]:
     seeds = len(config["seeds"])
     return [
-        f"{config['total_timesteps']} timesteps per arm{_given('hyperparameters', config)}",
+        f"{config['total_timesteps']} timesteps per arm{given('hyperparameters', config.get('hyperparameters', {}))}",
         _penalty(config),
         f"{seeds} training seed{'s' if seeds > 1 else ''}",
     ]
@@ -132,12 +132,6 @@ def _who(arms: Sequence[Arm]) -> str:
     if all(arm.scripted for arm in arms):
         return "Drivers"
     return "PPO" if all(arm.learner == "ppo" for arm in arms) else "Agents"
-
-
-def _given(option: str, config: dict[str, Any]) -> str:
-    """What replaces defaults: " (config.lanes_count 4)", " (rules.memory False)"; empty if nothing does."""
-    named = [f"{option}.{name} {value}" for name, value, _ in changes(config.get(option, {}), {})]
-    return f" ({', '.join(named)})" if named else ""
 
 
 def _penalty(config: dict[str, Any]) -> str:

@@ -28,6 +28,8 @@ PACKAGES = (
     "stable-baselines3",
     "torch",
 )
+SOURCES = "sources."  # of a record: digests of what a user brought along, by name
+Change = tuple[str, Any, Any]  # dotted name, now, before
 PAGES = "pages"  # folder in a run: episodes that play
 
 
@@ -75,15 +77,41 @@ def open_run(
     now = json.loads(to_json(provenance))
     changed = changes(now["config"], {**json.loads(to_json(dict(defaults))), **before["config"]})
     if changed:
-        raise ValueError(
-            f"{'; '.join(f'{field} = {new!r}, but {folder} was started with {old!r}' for field, new, old in changed)}; "
-            "give the same value, or --overwrite, or another --name"
-        )
+        raise ValueError(_refusal(changed, folder))
     return [
         f"{name} was {before.get(name)} when this run was started and is {now[name]} now"
         for name in now
         if name in before and name != "config" and before[name] != now[name]
     ]
+
+
+def _refusal(changed: list[Change], folder: Path) -> str:
+    """Why a run does not go on, and what to do."""
+    edited = [_is_edited(*one) for one in changed]
+    ways = ["give the same value"] * (not all(edited)) + ["put it back as it was"] * any(edited)
+    return (
+        f"{'; '.join(said(changed, f'{folder} was started'))}; {' and '.join(ways)}, or --overwrite starts it anew, or "
+        "--name chooses another folder"
+    )
+
+
+def said(changed: list[Change], since: str) -> list[str]:
+    """What differs, in words: a digest of a file says nothing to who has edited it.
+
+    Args:
+      changed: as of `changes`.
+      since: subject and verb of what was before: "runs/NAME was started".
+    """
+    return [
+        f"the file {'of ' * (':' in field)}{field.removeprefix(SOURCES)} has been changed since {since}"
+        if _is_edited(field, new, old)
+        else f"{field} = {new!r}, but {since} with {old!r}"
+        for field, new, old in changed
+    ]
+
+
+def _is_edited(field: str, new: Any, old: Any) -> bool:
+    return field.startswith(SOURCES) and None not in (new, old)
 
 
 def recorded(folder: Path) -> dict[str, Any] | None:
@@ -101,7 +129,7 @@ def recorded(folder: Path) -> dict[str, Any] | None:
         raise ValueError(f"{record} cannot be read: {error!r}; --overwrite starts anew") from None
 
 
-def changes(now: Any, before: Any, name: str = "") -> list[tuple[str, Any, Any]]:
+def changes(now: Any, before: Any, name: str = "") -> list[Change]:
     """(dotted name, now, before) of every value that differs; None where there is none."""
     sides = (now, before)
     if any(isinstance(side, dict) for side in sides) and all(isinstance(side, dict | None) for side in sides):
@@ -112,6 +140,12 @@ def changes(now: Any, before: Any, name: str = "") -> list[tuple[str, Any, Any]]
             for change in changes(now.get(key), before.get(key), f"{name}.{key}" if name else key)
         ]
     return [] if now == before else [(name, now, before)]
+
+
+def given(option: str, values: dict[str, Any]) -> str:
+    """What replaces the defaults of an environment or a preset: " (config.lanes_count 4)"; empty if nothing does."""
+    named = [f"{option}.{name} {value}" for name, value, _ in changes(values, {})]
+    return f" ({', '.join(named)})" if named else ""
 
 
 def versions() -> dict[str, Any]:

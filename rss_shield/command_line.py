@@ -48,6 +48,10 @@ class Overrides:
 
 
 NO_OVERRIDES = Overrides()
+_NUMBERS = {  # how Python refuses what is none
+    "invalid literal for int() with base 10": "a whole number",
+    "could not convert string to float": "a number",
+}
 
 
 def parsed(kind: type[T], prog: str, description: str, arguments: list[str], default: T | None = None) -> T:
@@ -62,7 +66,18 @@ def parsed(kind: type[T], prog: str, description: str, arguments: list[str], def
             raise
         _, *box = (line.strip("│| ") for line in printed.getvalue().splitlines() if line.strip())
         message = " ".join(line for line in box if line.strip("─-╰╯+"))
-        fail(prog, re.split("Argument helptext|For full helptext", message)[0] + f"(see {prog} --help)")
+        message = re.split("Argument helptext|For full helptext", message)[0].strip()
+        fail(prog, f"{_of_a_number(message) or message} (see {prog} --help)")
+
+
+def _of_a_number(message: str) -> str | None:
+    """What is said of what was to be a number, in our words; None of all else."""
+    option = re.search(r"--[\w.-]+", message)
+    for sign, expected in _NUMBERS.items():
+        value = re.search(rf"{re.escape(sign)}: '(.*?)'", message)
+        if option and value:
+            return f"{option[0].rstrip('.:')} {value[1]}: expected {expected}"
+    return None
 
 
 def fail(prog: str, message: str) -> NoReturn:

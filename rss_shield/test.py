@@ -7,6 +7,7 @@ if __name__ == "__main__":  # before all that takes its time
 
 import functools
 import json
+import shlex
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -31,12 +32,13 @@ from rss_shield.eval.arms import CONTINUOUS, OFF_AND_ON
 from rss_shield.eval.config_option import split_arguments, with_values
 from rss_shield.eval.files import atomic, folder_for, write_json
 from rss_shield.eval.metrics import summarise
-from rss_shield.eval.own import digests, driver_named, is_own
+from rss_shield.eval.own import digest_of, digests, driver_named, is_own
 from rss_shield.eval.progress import move_to, progress_bar
 from rss_shield.eval.rollout import evaluate
-from rss_shield.eval.run_folder import versions
+from rss_shield.eval.run_folder import changes, versions
 from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in, usual_preset
 from rss_shield.eval.suite.scored import columns_of, scored
+from rss_shield.eval.suite.tested import FIRST_SEED, check_free, title_of
 from rss_shield.eval.table import print_table, write_table
 from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
@@ -44,7 +46,6 @@ from rss_shield.shield.params import PRESETS, Preset, RSSParams, with_parameters
 
 PROGRAM = "rss-shield test"
 ENV_ID = "highway-fast-v0"
-FIRST_SEED = 10**9  # as train.py's tests
 SIDE_BY_SIDE = {"fast": 256, "highway-env": 1}
 HELP = """Test a trained model, or a policy of one's own, with the shield and without; say who crashes.
 
@@ -104,7 +105,10 @@ class Config:
     one_by_one: bool = False
     """The function maps one observation to one action."""
     out: Path = Path()
-    """Folder for the results; by default runs/tested/NAME-ENVIRONMENT."""
+    """Folder for the results; by default runs/tested/NAME-ENVIRONMENT, of a model of train.py with the name of its
+    run: runs/tested/RUN-ARM-seedK-model-ENVIRONMENT."""
+    overwrite: bool = False
+    """Replace results of other settings that are in the folder. Those of the same settings are replaced anyway."""
 
 
 def main(arguments: list[str]) -> None:
@@ -115,9 +119,10 @@ def main(arguments: list[str]) -> None:
         config = completed(config, values, card)
         policy, config = policy_for(config, card)
         tests = tests_of(config, card)
-        params = preset_of(config, card)
-        check_spaces(config, params, policy, next(iter(tests.values())))
-        folder_for(config.out)
+        preset, params = preset_of(config, card)
+        policy = fitted(config, params, policy, next(iter(tests.values())))
+        record = record_of(config, preset, params, tests)
+        check_free(folder_for(config.out), record, config.overwrite)
     except (ValueError, OSError, ImportError) as error:
         fail(PROGRAM, f"{type(error).__name__}: {error}" if isinstance(error, ImportError) else str(error))
     played = []
@@ -128,7 +133,8 @@ def main(arguments: list[str]) -> None:
             played.append(play(config, params, policy, card, test, shield))
         except ValueError as error:
             fail(PROGRAM, str(error))
-    report(config, params, pd.concat(played, ignore_index=True))
+    command = shlex.join([*PROGRAM.split(), *arguments])
+    report(config.out, record, command, pd.concat(played, ignore_index=True))
 
 
 def card_beside(policy: str) -> dict[str, Any]:
@@ -161,9 +167,7 @@ def completed(config: Config, values: dict[tuple[str, ...], Any], card: Mapping[
     history = config.history or card.get("history", 1)
     config = replace(config, env_id=env_id, config=given, history=history, **conduct)
     if config.out == Path():
-        name = Path(config.policy).stem if ":" not in config.policy else config.policy.replace(":", "-")
-        parent = Path(config.policy).parent.name if config.policy.endswith(".zip") else ""
-        config = replace(config, out=Path("runs") / "tested" / "-".join(filter(None, (parent, name, env_id))))
+        config = replace(config, out=Path("runs") / "tested" / f"{name_of(config.policy)}-{env_id}")
     for option, good, expected in (
         ("episodes", config.episodes >= 1, "at least 1"),
         ("first_seed", 0 <= config.first_seed < 2**31, "0 to 2**31 - 1"),
@@ -180,6 +184,15 @@ def completed(config: Config, values: dict[tuple[str, ...], Any], card: Mapping[
     return config
 
 
+def name_of(policy: str) -> str:
+    """A policy in the name of a folder: a function, or a model after its folder and, where it has a card, its run."""
+    if not policy.endswith(".zip"):
+        return Path(policy).stem if ":" not in policy else policy.replace(":", "-")
+    path = Path(policy)
+    folders = path.resolve().parts[-3:-1] if path.with_name("card.json").exists() else [path.parent.name]
+    return "-".join(filter(None, [*folders, path.stem]))
+
+
 def tests_of(config: Config, card: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """Name of each test -> options of the shield: those that a model was trained behind, and the test's own."""
     known = {**OFF_AND_ON, **card.get("tests", {})}
@@ -189,34 +202,61 @@ def tests_of(config: Config, card: Mapping[str, Any]) -> dict[str, Mapping[str, 
     return {test: {**card.get("options", {}), **known[test]} for test in config.tests}
 
 
-def preset_of(config: Config, card: Mapping[str, Any]) -> Preset | None:
-    """The table in force: as on the command line, as on the card, or what suits the environment (None).
+def preset_of(config: Config, card: Mapping[str, Any]) -> tuple[str, Preset]:
+    """Name and table in force: as on the command line, as on the card, or what suits the environment.
 
     Raises:
       ValueError: names an option out of range.
     """
-    preset = _preset_of(config, card)
-    if not (config.ego.given or config.other.given):
-        return preset
-    if preset is None:
-        preset = PRESETS[usual_preset(config.env_id)]
+    name, preset = _preset_of(config, card)
     try:
-        return with_parameters(preset, config.ego.given, config.other.given)
+        return name, with_parameters(preset, config.ego.given, config.other.given)
     except ValueError as error:
         raise ValueError(f"--{error}") from None
 
 
-def _preset_of(config: Config, card: Mapping[str, Any]) -> Preset | None:
+def _preset_of(config: Config, card: Mapping[str, Any]) -> tuple[str, Preset]:
     if config.preset != "auto":
         try:
-            return preset_in(config.preset)
+            return config.preset, preset_in(config.preset)
         except ValueError as error:
             raise ValueError(f"--preset: {error}") from None
     if card.get("env_id") != config.env_id or "parameters" not in card:
-        return None
+        usual = usual_preset(config.env_id)
+        return usual, PRESETS[usual]
     told = card["parameters"]
     sides = {side: RSSParams.validated(**{k: float(v) for k, v in told[side].items()}) for side in ("ego", "other")}
-    return Preset(**sides, source=told["source"], per_frame=told["per_frame"])
+    return card.get("preset", "on its card"), Preset(**sides, source=told["source"], per_frame=told["per_frame"])
+
+
+def record_of(config: Config, preset: str, params: Preset, tests: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """All that the result depends on."""
+    options = {name: value for name, value in vars(config).items() if name not in ("out", "overwrite")}
+    model = Path(config.policy)
+    return {
+        **options,
+        "preset": preset,
+        "ego": {**_replaced(preset, params, "ego"), **config.ego.given},
+        "other": {**_replaced(preset, params, "other"), **config.other.given},
+        "shield": {test: dict(shield) for test, shield in tests.items()},
+        "sources": {
+            **digests([config.policy, config.reward, config.preset]),
+            **({config.policy: digest_of(model)} if model.is_file() else {}),
+        },
+        "parameters": {
+            **{"ego": params.ego._asdict(), "other": params.other._asdict()},
+            **{"per_frame": params.per_frame, "source": params.source},
+        },
+    }
+
+
+def _replaced(preset: str, params: Preset, side: str) -> dict[str, float]:
+    """Parameters that are not the preset's, as a card may have them; nothing where its file is not here."""
+    try:
+        usual = preset_in(preset)
+    except ValueError:
+        return {}
+    return {name: value for name, value, _ in changes(getattr(params, side)._asdict(), getattr(usual, side)._asdict())}
 
 
 class Tested:
@@ -264,12 +304,16 @@ def environments(config: Config, params: Any, shield: Mapping[str, Any], n_envs:
     return with_history(env, config.history)
 
 
-def check_spaces(config: Config, params: Any, policy: Tested, shield: Mapping[str, Any]) -> None:
-    """Does a model fit the environment, as it is in one of the tests?"""
+def fitted(config: Config, params: Any, policy: Tested, shield: Mapping[str, Any]) -> Tested:
+    """The policy for the environment, as it is in one of the tests: a function's actions are compared with those there.
+
+    Raises:
+      ValueError: a model that is made for other observations or actions.
+    """
     env = environments(config, params, shield, 1)
     env.close()
     if policy.spaces is None:
-        return
+        return Tested(driver_named(config.policy, config.one_by_one, env.single_action_space))
     observations, actions = policy.spaces
     for kind, model, here in (
         ("observations", observations.shape, env.single_observation_space.shape),
@@ -280,6 +324,7 @@ def check_spaces(config: Config, params: Any, policy: Tested, shield: Mapping[st
                 f"{config.policy}: made for {kind} {model}, but {config.env_id} has {here}; --env-id and "
                 "--config.observation... choose another environment"
             )
+    return policy
 
 
 def _size(space: gym.Space) -> Any:
@@ -305,20 +350,16 @@ def play(
     return episodes.assign(train=card.get("arm", config.policy), test=test, train_seed=card.get("train_seed", 0))
 
 
-def report(config: Config, params: Any, episodes: pd.DataFrame) -> None:
+def report(out: Path, record: dict[str, Any], command: str, episodes: pd.DataFrame) -> None:
     """Print the table; write it, the episodes and what they depend on."""
-    summary = summarise(episodes)
-    title = f"{config.policy} on {config.env_id}, {config.episodes} episodes"
-    with atomic(config.out / "episodes.csv") as temporary:
+    summary, title = summarise(episodes), title_of(record)
+    (out / "config.json").unlink(missing_ok=True)  # it comes last: what is half written is nobody's results
+    with atomic(out / "episodes.csv") as temporary:
         episodes.to_csv(temporary, index=False)
-    sources = digests([config.policy, config.reward, config.preset])
-    table = {"ego": params.ego._asdict(), "other": params.other._asdict(), "source": params.source} if params else None
-    record = {**vars(config), "out": str(config.out), "parameters": table, "sources": sources}
-    record |= {"ego": config.ego.given, "other": config.other.given}
-    write_json(config.out / "config.json", {"config": record, **versions()})
-    write_table(summary, config.out, title)
+    write_table(summary, out, title)
+    write_json(out / "config.json", {"config": record, "command": command, **versions()})
     print_table(summary, title, Console(width=None if sys.stdout.isatty() else 160))
-    print(f"\nEvery episode, with its verdict: {config.out / 'episodes.csv'}")
+    print(f"\nEvery episode, with its verdict: {out / 'episodes.csv'}")
 
 
 run = main  # what the console command calls

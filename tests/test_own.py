@@ -25,9 +25,11 @@ from rss_shield.eval.runs.tasks import tasks_of
 from rss_shield.eval.suite.comparison.reading import resolve, started
 from rss_shield.eval.suite.own_table import preset_in
 from rss_shield.eval.suite.scored import Scored, columns_of
+from rss_shield.eval.suite.scripted import play
 from rss_shield.eval.suite.sweep import check_tasks
 from rss_shield.shield.params import PRESETS
 
+ENV = "highway-fast-v0"
 MODULE = """
 import numpy as np
 
@@ -47,6 +49,15 @@ def scalar(decision):
 
 def nothing(decision):
     return decision.reward * np.nan
+
+def texts(decision):
+    return ["good"] * len(decision.reward)
+
+def pairs(observations):
+    return np.zeros((len(observations), 2), int)
+
+def ragged(observations):
+    return [[1], *([1, 2] for _ in observations[1:])]
 """
 
 
@@ -84,8 +95,29 @@ def test_what_cannot_be_looked_up_is_said_in_one_line(name, message, capsys):
 def test_a_policy_answers_with_one_action_for_each_observation():
     seen = np.zeros((4, 5, 5))
     assert driver_named("brought:drive")(seen).tolist() == driver_named("brought:one", True)(seen).tolist() == [3] * 4
-    with pytest.raises(ValueError, match=r"shape \(\) for 4 observations"):
+    with pytest.raises(OwnFailed, match="brought:one: returned int 3 for 4 observations; expected one action for"):
         driver_named("brought:one")(seen)
+    with pytest.raises(OwnFailed, match=r"brought:ragged: returned list \[\[1\], \[1, 2\], .* for 4 observations"):
+        driver_named("brought:ragged")(seen)
+
+
+@pytest.mark.parametrize(
+    ("name", "space", "message"),
+    [
+        ("pairs", gym.spaces.Discrete(5), r"shape \(4, 2\) and type int64, .* one whole number from 0 to 4 for each"),
+        ("drive", gym.spaces.Discrete(3), r"shape \(4,\) .*\[3, 3, 3\] .* one whole number from 0 to 2 for each"),
+        ("drive", gym.spaces.Box(-1.0, 1.0, (2,)), r"shape \(4,\) .* expected finite numbers of shape \(2,\) for each"),
+    ],
+)
+def test_actions_are_those_of_the_environment(name, space, message):
+    with pytest.raises(OwnFailed, match=f"brought:{name}: returned an array of {message}"):
+        driver_named(f"brought:{name}", actions=space)(np.zeros((4, 5, 5)))
+
+
+@pytest.mark.parametrize("backend", ["fast", "highway-env"])
+def test_a_sweep_names_the_policy_whose_actions_do_not_fit(backend):
+    with pytest.raises(OwnFailed, match=r"brought:pairs: returned an array of shape \(\d, 2\)"):
+        play(ENV, "brought:pairs", {"backend": backend, "config.duration": 3}, range(2))
 
 
 def test_what_an_own_function_raises_names_it_and_its_line(tmp_path, monkeypatch, capsys):
@@ -230,7 +262,11 @@ def test_a_reward_may_work_in_place():
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("scalar", r"shape \(\) for 2 environments; expected \(2,\)"), ("nothing", "nan; expected")],
+    [
+        ("scalar", r"shape \(\) for 2 environments; expected \(2,\)"),
+        ("nothing", "nan; expected"),
+        ("texts", r"returned list \['good', 'good'\]; expected numbers, shape \(2,\)"),
+    ],
 )
 def test_a_reward_is_one_finite_number_for_each_environment(name, message):
     infos = {"raw_reward": np.ones(2)}
@@ -298,4 +334,5 @@ def test_the_test_command_takes_tables_parameters_and_rewards(tmp_path):
     record = json.loads(Path("o/config.json").read_text())["config"]
     assert record["parameters"]["ego"]["response_time"] == 0.5 and record["parameters"]["ego"]["mu"] == 0.3
     assert set(record["sources"]) == {"brought:drive", "brought:length", "mine.yaml"}
-    assert "own return" in Path("o/table.md").read_text()
+    table = Path("o/table.md").read_text()
+    assert "own return" in table and "preset mine.yaml (ego.mu 0.3), reward brought:length, 3 episodes" in table

@@ -33,7 +33,7 @@ SCRIPTS = {
     "judge_a_log": "5.50 s: contact of ego and other, at fault: ego; ego braked less than the proper response asks",
     "baseline": "the shield: at fault in 0 of 5",
     "explained_video": "explained.webp: 12 pictures",
-    "drive_and_test": "drive_and_test:drive on highway-fast-v0, 20 episodes",
+    "drive_and_test": "drive_and_test:drive on highway-fast-v0, RSS preset simulator, 20",
     "sb3_vector": "with it: ",
     "vector_wrappers": "observations (32, 25), ",
     "torchrl_cost": "cost of 5 random episodes: ",

@@ -1,6 +1,7 @@
 """`rss-shield test`: models of ours and of others, functions, and what goes wrong."""
 
 import json
+import sys
 from pathlib import Path
 
 import gymnasium as gym
@@ -13,6 +14,9 @@ import rss_shield.test
 from rss_shield import train
 from rss_shield.agents.load import algorithm_in, load_policy
 from rss_shield.agents.vec_env import VectorEnvAdapter
+from rss_shield.eval.arms import OFF_AND_ON
+from rss_shield.eval.suite.tested import title_of
+from rss_shield.shield.params import Rules
 
 ENV = "highway-fast-v0"
 SMALL = ["--episodes", "3", "--config.duration", "6"]
@@ -30,6 +34,9 @@ def faster_one(observation):
 
 def one_for_all(observations):
     return 3
+
+def pairs(observations):
+    return np.zeros((len(observations), 2), int)
 """
 
 
@@ -37,6 +44,7 @@ def one_for_all(observations):
 def in_a_folder_of_its_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_driver.py").write_text(DRIVERS)
+    monkeypatch.delitem(sys.modules, "my_driver", raising=False)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +55,7 @@ def model(tmp_path_factory):
 
 
 def played(*arguments):
-    rss_shield.test.main([*map(str, arguments), *SMALL, "--out", "out"])
+    rss_shield.test.main([*map(str, arguments), *SMALL, "--out", "out", "--overwrite"])
     return pd.read_csv("out/episodes.csv")
 
 
@@ -59,9 +67,86 @@ def test_a_function_is_tested_with_the_shield_and_without(capsys):
     assert (episodes.loc[episodes["test"] == "on", "blame"] == "no contact").all()
     assert set(episodes.loc[episodes["test"] == "off", "blame"]) <= {"ego", "no contact"}
     out = " ".join(capsys.readouterr().out.split())
-    assert f"my_driver:faster on {ENV}, 3 episodes" in out
+    assert f"my_driver:faster on {ENV} (config.duration 6), RSS preset simulator, 3 episodes" in out
     assert "Every episode, with its verdict: out/episodes.csv" in out
-    assert json.loads(Path("out/config.json").read_text())["config"]["config"] == {"duration": 6}
+    told = json.loads(Path("out/config.json").read_text())
+    assert told["config"]["config"] == {"duration": 6}
+    assert told["command"].startswith("rss-shield test my_driver:faster --episodes 3")
+    assert told["config"]["parameters"]["ego"] == rss_shield.PRESETS["simulator"].ego._asdict()
+
+
+def refused(capsys, *arguments):
+    """What is said to arguments that are refused."""
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as stop:
+        rss_shield.test.main([*map(str, arguments)])
+    assert stop.value.code == 2
+    return capsys.readouterr().err
+
+
+def test_results_of_other_settings_are_kept(capsys):
+    words = ["my_driver:faster", "--tests", "on", "--episodes", "1"]
+    for _ in range(2):  # the same again is the same again
+        rss_shield.test.main(words)
+    folder = Path("runs") / "tested" / f"my_driver-faster-{ENV}"
+    before = (folder / "episodes.csv").read_bytes()
+    said = refused(capsys, *words[:3], "--episodes", "2", "--ego.mu", "0.3")
+    assert f"{folder} holds results of other settings: episodes = 2, but it was written with 1; ego.mu = 0.3" in said
+    assert "--overwrite replaces them, --out chooses another folder" in said and "parameters" not in said
+    Path("my_driver.py").write_text(DRIVERS + "# edited\n")
+    assert "the file of my_driver:faster has been changed since it was written" in refused(capsys, *words)
+    assert (folder / "episodes.csv").read_bytes() == before
+    rss_shield.test.main([*words[:3], "--episodes", "2", "--overwrite"])
+    assert len(pd.read_csv(folder / "episodes.csv")) == 2
+
+
+@pytest.mark.parametrize("record", [{"config.json": '{"config": {"arms": []}}'}, {"experiment.json": "{}"}])
+def test_a_training_or_a_sweep_is_never_overwritten(record, tmp_path, capsys):
+    for name, text in record.items():
+        (tmp_path / name).write_text(text)
+        said = refused(capsys, "my_driver:faster", "--out", tmp_path, "--overwrite")
+        assert "expected a folder of its own; this one is that of a training or a sweep" in said
+        assert (tmp_path / name).read_text() == text
+
+
+def test_models_of_two_runs_have_folders_of_their_own(tmp_path):
+    paths = [tmp_path / run / "shielded-seed0" / "model.zip" for run in ("r1", "r2")]
+    for path in paths:
+        path.parent.mkdir(parents=True)
+        path.with_name("card.json").write_text("{}")
+    assert [rss_shield.test.name_of(str(path)) for path in paths] == [f"r{k}-shielded-seed0-model" for k in (1, 2)]
+    assert rss_shield.test.name_of("dqn.zip") == "dqn"
+
+
+RECORD = {
+    **{"policy": "model.zip", "env_id": ENV, "config": {}, "preset": "simulator", "ego": {}, "other": {}, "reward": ""},
+    **{"entry": "cautious", "intent": "any", "waiting": "line", "history": 1, "backend": "fast", "episodes": 1000},
+    **{"first_seed": 10**9, "shield": OFF_AND_ON},
+}
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({}, "RSS preset simulator, 1000 episodes"),
+        ({"config": {"lanes_count": 4}}, f"{ENV} (config.lanes_count 4), "),
+        ({"preset": "slides"}, "RSS preset slides, "),
+        ({"ego": {"mu": 0.3}}, "simulator (ego.mu 0.3), "),
+        ({"other": {"mu": 0.3}}, "simulator (other.mu 0.3), "),
+        ({"reward": "mine:reward"}, ", reward mine:reward, "),
+        ({"intent": "known"}, ", intent known, "),
+        ({"history": 2}, ", history 2, "),
+        ({"backend": "highway-env"}, ", backend highway-env, "),
+        ({"first_seed": 7}, ", 1000 episodes from seed 7 on"),
+        (
+            {"shield": {test: {**one, "rules": Rules(memory=False)._asdict()} for test, one in OFF_AND_ON.items()}},
+            "simulator, shield rules.memory False, 1000 episodes",
+        ),
+        ({"shield": {**OFF_AND_ON, "on": {"shield": "override", "filter": "cbf"}}}, ", test on: filter cbf, "),
+    ],
+)
+def test_the_title_says_what_differs_from_the_defaults(changed, said):
+    assert said in title_of({**RECORD, **changed})
 
 
 def test_one_by_one_gives_the_same(capsys):
@@ -94,10 +179,11 @@ def test_a_card_says_on_which_road(model, tmp_path, capsys):
     card["parameters"] = {**sides, "source": "a test", "per_frame": False}
     (tmp_path / "of-a-run" / "card.json").write_text(json.dumps(card))
     rss_shield.test.main([str(copy), "--episodes", "2", "--tests", "off"])
-    folder = tmp_path / "runs" / "tested" / "of-a-run-model-merge-v0"
+    folder = tmp_path / "runs" / "tested" / f"{tmp_path.name}-of-a-run-model-merge-v0"
     told = json.loads((folder / "config.json").read_text())["config"]
     assert told["env_id"] == "merge-v0"
     assert told["parameters"]["ego"]["response_time"] == rss_shield.PRESETS["slides"].ego.response_time
+    assert told["preset"] == "slides" and not told["ego"] and set(told["sources"]) == {str(copy)}
     assert set(pd.read_csv(folder / "episodes.csv")["train"]) == {"shielded"}
 
 
@@ -140,7 +226,8 @@ def test_algorithms_that_share_a_policy_are_told_apart(tmp_path):
         ("no_module:drive", "no_module:drive: no module 'no_module'"),
         ("my_driver:drive", "my_driver:drive: module 'my_driver' has no 'drive'"),
         ("my_driver:number", "my_driver:number: int cannot be called; expected a function"),
-        ("my_driver:one_for_all", "returned an array of shape () for 3 observations; expected one action for each"),
+        ("my_driver:one_for_all", "returned int 3 for 3 observations; expected one whole number from 0 to 4 for each"),
+        ("my_driver:pairs", "my_driver:pairs: returned an array of shape (3, 2) and type int64, [[0, 0], [0, 0], "),
         ("my_driver:faster --tests of", "--tests of is out of range: expected some of off, on"),
         ("my_driver:faster --episodes 0", "--episodes 0 is out of range: expected at least 1"),
         ("my_driver:faster --backend slow", "--backend slow is out of range: expected one of fast, highway-env"),

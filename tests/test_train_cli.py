@@ -62,7 +62,13 @@ def start(runs: Path, *arguments: str) -> subprocess.Popen:
         ("--target-intervention -1", "--target-intervention -1.0 is out of range: expected a number >= 0"),
         ("--removal-checks -1", "--removal-checks -1 is out of range: expected at least 0"),
         ("--total-timesteps 0", "--total-timesteps 0 is out of range: expected at least 1"),
-        ("--total-timesteps many", "--total-timesteps: invalid literal for int() with base 10: 'many'"),
+        ("--total-timesteps many", "error: --total-timesteps many: expected a whole number (see train.py --help)"),
+        ("--total-timesteps 1e4", "error: --total-timesteps 1e4: expected a whole number"),
+        ("--ego.mu wide", "error: --ego.mu wide: expected a number"),
+        (
+            "--env-id highway-fast",
+            "does not support env_id = 'highway-fast'; expected one of highway-v0, highway-fast-v0",
+        ),
         ("--seeds", "--seeds is out of range: expected different whole numbers, 0 to 2**32 - 1"),
         ("--seeds 1 1", "--seeds 1 1 is out of range: expected different whole numbers"),
         ("--seeds -1", "--seeds -1 is out of range: expected different whole numbers"),
@@ -136,6 +142,17 @@ def test_bad_input_ends_in_one_line_and_exit_code_2(arguments, message, monkeypa
     assert lines[0].startswith("train.py: error: ")
     assert message in lines[0]
     assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_of_runs_that_is_none_is_named_by_its_option(monkeypatch, capsys, tmp_path):
+    (tmp_path / "road.json").write_text("{}")
+    for taken in ("road.json", "road.json/below"):
+        with pytest.raises(SystemExit) as stop:
+            call(monkeypatch, "--runs-dir", str(tmp_path / taken))
+        assert stop.value.code == 2
+        assert f"train.py: error: --runs-dir {tmp_path / taken}: expected a folder; {tmp_path}/road.json is a file" in (
+            capsys.readouterr().err
+        )
 
 
 def test_help_shows_examples_and_every_option(monkeypatch, capsys):

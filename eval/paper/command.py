@@ -14,7 +14,7 @@ from typing import Annotated
 import tyro
 
 from rss_shield.eval.files import folder_for, linked_names, refuse
-from rss_shield.eval.paper.read import across_roads, section_of
+from rss_shield.eval.paper.read import across_roads, kind_of, section_of
 from rss_shield.eval.paper.render import write_report
 from rss_shield.eval.provenance import records_of
 
@@ -24,7 +24,7 @@ class Arguments:
     """One option a field."""
 
     runs: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    """Folders of finished runs and sweeps."""
+    """Folders of finished runs of train, test and sweep."""
     out: Path | None = None
     """Folder of the report; by default report/ in the first run."""
     title: str = "Shielded and unshielded agents compared"
@@ -39,9 +39,8 @@ def write(runs: tuple[Path, ...], out: Path | None, title: str) -> Path:
     """
     if not runs:
         raise ValueError("name a run or sweep folder, such as runs/highway-fast-v0")
-    unknown = next((run for run in runs if not run.is_dir()), None)
-    if unknown is not None:
-        raise ValueError(f"{unknown}: expected the folder of a finished run or sweep")
+    for run in runs:  # all of them, before anything is written
+        kind_of(run)
     out = folder_for(out or runs[0] / "report")
     names = linked_names(map(_name, runs), taken=["roads"])
     sections = [section_of(run, out / "figures" / name) for run, name in zip(runs, names, strict=True)]

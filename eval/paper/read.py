@@ -47,28 +47,57 @@ GROUPS = {  # tables of a run: headings of their metrics
 INTERVALS = "[low, high]: 95 % interval over test episodes of these trained models; (low, high): over training seeds."
 
 
+def kind_of(folder: Path) -> str:
+    """What a folder of results holds: "sweep", "run" (of `rss-shield train`) or "test" (of `rss-shield test`).
+
+    Raises:
+      ValueError: none of them, or not finished.
+    """
+    if (folder / "experiment.json").exists() and (folder / "points.csv").exists():
+        return "sweep"
+    finished = (folder / "config.json").exists() and (folder / "episodes.csv").exists()
+    config = record_in(folder).get("config", {}) if finished else {}
+    for kind, key in (("run", "arms"), ("test", "policy")):
+        if {"env_id", key} <= set(config):
+            return kind
+    raise ValueError(
+        f"{folder}: expected a finished run of rss-shield train or test (config.json, episodes.csv) or sweep "
+        "(experiment.json, points.csv)"
+    )
+
+
+def record_in(folder: Path) -> dict[str, Any]:
+    """What a run or a test has recorded of itself.
+
+    Raises:
+      ValueError: it cannot be read.
+    """
+    path = folder / "config.json"
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path} cannot be read: {error}") from None
+
+
 def section_of(folder: Path, figures: Path) -> Section:
-    """The section of a run or a sweep.
+    """The section of a run, a test or a sweep.
 
     Args:
       folder: of results.
       figures: folder that its figures are drawn into; its name heads the labels of tables.
 
     Raises:
-      ValueError: neither of both, or not finished.
+      ValueError: none of these, or not finished.
     """
     folder = Path(os.path.abspath(folder))  # which has a name, unlike .
+    kind = kind_of(folder)
     figures.mkdir(parents=True, exist_ok=True)
-    if (folder / "experiment.json").exists() and (folder / "points.csv").exists():
-        return _of_sweep(folder, figures)
-    if (folder / "config.json").exists() and (folder / "episodes.csv").exists():
-        return _of_run(folder, figures)
-    expected = "a finished run (config.json, episodes.csv) or sweep (experiment.json, points.csv)"
-    raise ValueError(f"{folder}: expected {expected}")
+    return _of_sweep(folder, figures) if kind == "sweep" else _of_episodes(folder, figures, kind)
 
 
-def _of_run(folder: Path, figures: Path) -> Section:
-    record = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+def _of_episodes(folder: Path, figures: Path, kind: str) -> Section:
+    """The section of a run or a test; a test has no models of its own, so no curves."""
+    record = record_in(folder)
     config = record["config"]
     episodes = read_episodes(folder)
     summary, compared = summarise(episodes), comparisons(episodes)
@@ -89,17 +118,32 @@ def _of_run(folder: Path, figures: Path) -> Section:
         )
     return Section(
         folder.name if folder.name == config["env_id"] else f"{config['env_id']} ({folder.name})",
-        [f"{title_of(config)}.", *words.of_run(episodes, summary, compared)],
+        [*_title_of(folder, kind, config), *words.of_run(episodes, summary, compared)],
         tables,
-        list(_figures_of_run(folder, figures, config, episodes, summary)),
+        list(_figures_of(folder, figures, config, episodes, summary)),
         legend(summary),
-        command(record),
+        command(record) if kind == "run" else tested_by(record),
         pages_of(folder),
     )
 
 
-def _figures_of_run(folder: Path, figures: Path, config: dict[str, Any], episodes: pd.DataFrame, summary: pd.DataFrame):
-    road, models = str(config["env_id"]), [(arm, seed) for arm in config["arms"] for seed in config["seeds"]]
+def _title_of(folder: Path, kind: str, config: dict[str, Any]) -> list[str]:
+    """What was trained or tested and how; of a test as its table has it in the first line."""
+    if kind == "run":
+        return [f"{title_of(config)}."]
+    table = folder / "table.md"
+    return [f"{table.read_text(encoding='utf-8').splitlines()[0]}."] if table.exists() else []
+
+
+def tested_by(record: dict[str, Any]) -> str:
+    """The command line of a test; of one that has not recorded it, the beginning."""
+    config = record["config"]
+    return record.get("command") or f"rss-shield test {config['policy']} --env-id {config['env_id']}"
+
+
+def _figures_of(folder: Path, figures: Path, config: dict[str, Any], episodes: pd.DataFrame, summary: pd.DataFrame):
+    road = str(config["env_id"])
+    models = [(arm, seed) for arm in config.get("arms", ()) for seed in config.get("seeds", ())]
     plot_blame(episodes, figures, road)
     yield Figure("Who is to blame for the contacts of each cell.", figures / "blame.png")
     paths = {model: folder / f"{model[0]}-seed{model[1]}" / "learning_curve.csv" for model in models}
@@ -185,7 +229,7 @@ def returns_by_road(folders: Sequence[Path]) -> dict[str, pd.Series]:
     for folder in folders:
         if not ((folder / "episodes.csv").exists() and (folder / "config.json").exists()):
             continue
-        config = json.loads((folder / "config.json").read_text(encoding="utf-8"))["config"]
+        config = record_in(folder)["config"]
         own = f" {json.dumps(config['config'], sort_keys=True)}" if config.get("config") else ""
         road = f"{config['env_id']}{own}"
         means = with_outcomes(read_episodes(folder)).groupby(["train", "test", "train_seed"])["return"].mean()

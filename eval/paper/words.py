@@ -11,7 +11,7 @@ from rss_shield.eval.table import rounded
 
 
 def of_run(episodes: pd.DataFrame, summary: pd.DataFrame, compared: pd.DataFrame) -> list[str]:
-    """The paragraphs of a run of `rss-shield train`.
+    """The paragraphs of a run of `rss-shield train` or `test`.
 
     Args:
       episodes: all test episodes.
@@ -65,7 +65,7 @@ def _faults(tested: pd.DataFrame, where: str) -> str:
     bound = clopper_pearson(faults, n)
     text = f"Tested {where}: {crashes} contacts in {n} episodes, {faults} of them the ego's fault "
     text += (
-        f"({100 * bound.value:.2g} %, 95 % interval {100 * bound.low:.2g} to {100 * bound.high:.2g} %, over episodes"
+        f"({_percent(bound.value)} %, 95 % interval {_percent(bound.low)} to {_percent(bound.high)} %, over episodes"
     )
     rates = tested.groupby("train", sort=False)["at_fault"].mean()
     if len(rates) > 1 and faults:
@@ -75,6 +75,11 @@ def _faults(tested: pd.DataFrame, where: str) -> str:
     return (
         text + ")" + (f"; {unexplained} that nobody's duty explains, which would be a bug" if unexplained else "") + "."
     )
+
+
+def _percent(share: float) -> str:
+    """Two digits; 100, and not 1e+02, of what is nearly all."""
+    return f"{100 * share:.2g}" if share < 0.995 else "100"
 
 
 def _cell(cell: tuple[str, str]) -> str:

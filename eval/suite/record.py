@@ -50,7 +50,7 @@ def policy_of(name: str, env: Any, seed: int, one_by_one: bool = False) -> Calla
       ValueError: there is no such policy, or none for this environment.
     """
     if is_own(name):
-        own = driver_named(name, one_by_one)
+        own = driver_named(name, one_by_one, env.action_space)
         return lambda observation: own(np.asarray(observation)[None])[0]
     space = env.action_space
     if name == "random":

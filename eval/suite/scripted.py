@@ -87,9 +87,9 @@ def play(environment: str, policy: str, options: dict[str, Any], seeds: range) -
     """One row per episode; columns as in `eval.rollout.run_episode`."""
     arguments = setup_of(environment, options)
     backend, reward = arguments.pop("backend"), arguments.pop("reward", "")
-    own = driver_named(policy) if is_own(policy) else None
+    space = _space(environment, backend, arguments)
+    own = driver_named(policy, actions=space) if is_own(policy) else None
     if backend == "highway-env":
-        space = _space(environment, backend, arguments)
 
         def driver(seed: int) -> Callable[[Any], Any]:
             return Scripted(policy, space, seed) if own is None else lambda seen: own(np.asarray(seen)[None])[0]
@@ -104,7 +104,6 @@ def play(environment: str, policy: str, options: dict[str, Any], seeds: range) -
             env.recording.choose(range(n))
         return env
 
-    space = _space(environment, backend, arguments)
     chunks = [seeds[i : i + SIDE_BY_SIDE] for i in range(0, len(seeds), SIDE_BY_SIDE)]
     frames = []
     for chunk in chunks:

@@ -19,7 +19,8 @@ from typing import Annotated, Any, Literal
 import pandas as pd
 import tyro
 
-from rss_shield.eval.files import refuse, to_json, write_json
+from rss_shield.command_line import parsed
+from rss_shield.eval.files import folder_for, refuse, to_json, write_json
 from rss_shield.eval.metrics import with_outcomes
 from rss_shield.eval.progress import progress_bar
 from rss_shield.eval.run_folder import versions
@@ -297,13 +298,13 @@ def _record(experiment: Experiment, folder: Path, asked: Mapping[str, Any]) -> l
 
 def run(arguments: list[str]) -> None:
     """What a command line asks for."""
-    given = tyro.cli(Arguments, prog="rss-shield sweep", description=__doc__, args=arguments)
+    given = parsed(Arguments, "rss-shield sweep", __doc__ or "", arguments)
     try:
         budget = {"episodes": given.episodes, "total_timesteps": given.total_timesteps}
         experiment = with_budget(read_experiment(given.experiment), **budget)
         done = sweep(
             experiment,
-            given.runs_dir / experiment.name,
+            folder_for(given.runs_dir, "--runs-dir") / experiment.name,
             file=str(given.experiment),
             options=as_words({name: value for name, value in budget.items() if value is not None}),
             backend=given.backend,

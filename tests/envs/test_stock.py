@@ -247,3 +247,9 @@ def test_there_are_as_many_agents_as_asked_for(env_id, count):
 def test_more_agents_than_cars_are_refused():
     with pytest.raises(ValueError, match="controlled_vehicles = 6: expected at most 5"):
         make("merge-v0", config=AGENTS | {"controlled_vehicles": 6})
+
+
+def test_a_road_without_a_version_is_made_without_a_word():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make("highway-fast").close()

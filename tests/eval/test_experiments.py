@@ -130,6 +130,21 @@ def test_workers_are_refused_before_any_work(tmp_path, monkeypatch, capsys, work
     assert said.err == f"rss-shield sweep: error: --workers {workers} is out of range: expected 1 to 256\n"
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("--runs-dir e.yaml", "--runs-dir e.yaml: expected a folder; e.yaml is a file"),
+        ("--episodes 1e4", "--episodes 1e4: expected a whole number (see rss-shield sweep --help)"),
+    ],
+)
+def test_options_of_a_sweep_are_refused_by_name(tmp_path, monkeypatch, capsys, options, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "e.yaml").write_text("policies: [idle]\n")
+    with pytest.raises(SystemExit) as stop:
+        main(["sweep", "e.yaml", *options.split()])
+    assert stop.value.code == 2 and capsys.readouterr().err == f"rss-shield sweep: error: {said}\n"
+
+
 def test_a_task_that_fails_says_so_in_one_line_and_is_done_again(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))

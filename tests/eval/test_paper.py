@@ -168,6 +168,46 @@ def test_where_nobody_learns_there_are_no_training_seeds(folder, tmp_path):
     assert "<p>1 cell (an arm, tested one way), 20 test episodes.</p>" in page
 
 
+def test_a_test_has_its_tables_and_its_blame_and_no_curves(folder, tmp_path):
+    tested = tmp_path / "tested"
+    tested.mkdir()
+    record = {
+        "config": {"policy": "my_driver:drive", "env_id": "merge-v0"},
+        "command": "rss-shield test my_driver:drive",
+    }
+    (tested / "config.json").write_text(json.dumps({**record, **versions()}))
+    (tested / "table.md").write_text("my_driver:drive on merge-v0, RSS preset slides, 20 episodes\n\n| |\n")
+    rows = [
+        episodes_of(["ego"] * 20, "my_driver:drive", "off"),
+        episodes_of([""] * 20, "my_driver:drive", "on"),
+    ]
+    pd.concat(rows, ignore_index=True).assign(train_seed=0).to_csv(tested / "episodes.csv", index=False)
+    page = write((folder, tested), tmp_path / "report", "Both").read_text()
+    assert "merge-v0 (tested)" in page and "my_driver:drive on merge-v0, RSS preset slides, 20 episodes." in page
+    assert "rss-shield test my_driver:drive</" in page
+    assert "20 of them the ego&#x27;s fault (100 %, 95 % interval 83 to 100 %" in page
+    drawn = {path.name for path in (tmp_path / "report" / "figures" / "tested").glob("*.png")}
+    assert "blame.png" in drawn and "learning_curve.png" not in drawn
+    latex = (tmp_path / "report" / "report.tex").read_text()
+    assert "tested-safety" in latex and "tested-compared" in latex
+
+
+def test_nothing_is_written_where_one_folder_is_none(folder, tmp_path):
+    another, unread = tmp_path / "another", tmp_path / "unread"
+    for path, record in ((another, '{"config": {"env_id": "merge-v0"}}'), (unread, "{")):
+        path.mkdir()
+        (path / "config.json").write_text(record)
+        shutil.copy(folder / "episodes.csv", path)
+    for bad, said in (
+        (another, "expected a finished run of rss-shield train or test"),
+        (unread, "cannot be read"),
+        (tmp_path / "nowhere", "expected a finished run of rss-shield train or test"),
+    ):
+        with pytest.raises(ValueError, match=said) as error:
+            write((folder, bad), tmp_path / "report", "Half")
+        assert str(bad) in str(error.value) and not (tmp_path / "report").exists()
+
+
 def test_roads_together_have_profiles(folder, tmp_path):
     same, another = tmp_path / "same", tmp_path / "another"
     shutil.copytree(folder, same)
@@ -194,14 +234,17 @@ def test_what_arms_do_on_several_roads_is_over_the_seeds_that_all_have(folder, t
     assert all(not table.any() for table in scores_of(flat).values())  # nothing tells them apart
 
 
-def test_what_is_no_run_is_refused_in_one_line(tmp_path, capsys):
+def test_what_is_no_run_is_refused_in_one_line(folder, tmp_path, capsys):
     with pytest.raises(SystemExit) as stop:
         run([str(tmp_path)])
     assert stop.value.code == 2
-    assert "expected a finished run (config.json, episodes.csv) or sweep" in capsys.readouterr().err
+    assert (
+        "expected a finished run of rss-shield train or test (config.json, episodes.csv) or sweep"
+        in capsys.readouterr().err
+    )
     for arguments, message in (
         ([], "name a run or sweep folder"),
-        ([str(tmp_path), "--out", __file__], f"--out {__file__}: expected a folder"),
+        ([str(folder), "--out", __file__], f"--out {__file__}: expected a folder"),
     ):
         with pytest.raises(SystemExit) as stop:
             run(arguments)

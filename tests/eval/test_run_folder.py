@@ -64,6 +64,15 @@ def test_every_difference_is_named_however_deep(tmp_path):
         open_run(tmp_path, other, resume=True, overwrite=False)
 
 
+def test_an_edited_file_of_a_users_own_is_named_and_not_its_digest(tmp_path):
+    brought = CONFIG | {"sources": {"rewards:tidy": "d009", "mine.yaml": "77aa"}}
+    open_run(tmp_path, brought, resume=False, overwrite=False)
+    edited = brought | {"sources": {"rewards:tidy": "63f1", "mine.yaml": "77aa"}}
+    with pytest.raises(ValueError, match=r"^the file of rewards:tidy has been changed since .*; put it back") as told:
+        open_run(tmp_path, edited, resume=True, overwrite=False)
+    assert "63f1" not in str(told.value) and "--overwrite" in str(told.value) and "--name" in str(told.value)
+
+
 def test_the_configuration_of_a_run_is_read_back(tmp_path):
     assert recorded(tmp_path / "nothing") is None
     open_run(tmp_path, CONFIG | {"table": np.array([1.0, 2.0])}, resume=False, overwrite=False)

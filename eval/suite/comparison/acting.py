@@ -26,10 +26,10 @@ def learner(config: Config, arm: Arm) -> Learner:
 
 def driver(config: Config, preset: Preset, arm: Arm, seed: int) -> drivers.Driver:
     """The policy of an arm that learns nothing."""
-    if arm.own:
-        return driver_named(arm.name)
     env: Any = original(config, preset, arm, SHIELDED)()
     env.close()
+    if arm.own:
+        return driver_named(arm.name, actions=env.action_space)
     numbers = env.unwrapped.action_type.actions_indexes
     name = arm.settings["driver"]
     if name == "semantic":
