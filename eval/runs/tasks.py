@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rss_shield.eval.arms import arm_named
 from rss_shield.eval.files import to_json
 from rss_shield.eval.own import digests
 from rss_shield.eval.runs.experiment import Drawn, Experiment, Range
@@ -35,7 +34,7 @@ def tasks_of(experiment: Experiment, drawn: dict[str, Any] | None = None) -> lis
     """Every combination; `drawn`: values of what is drawn, of one sample.
 
     Raises:
-      ValueError: something is set twice; there is no such arm; a function of one's own is not there.
+      ValueError: something is set twice; a function of one's own is not there.
     """
     kind, players = ("arm", experiment.arms) if experiment.arms else ("policy", experiment.policies)
     names = list(experiment.grid)
@@ -56,9 +55,7 @@ def tasks_of(experiment: Experiment, drawn: dict[str, Any] | None = None) -> lis
         point = {name: value for name, (value, shown) in several.items() if shown} | varied
         own = digests([player, *options.values()])  # what is changed is run anew
         sources = {"sources": own} if own else {}
-        # who learns nothing does the same with every training seed
-        seeds = experiment.seeds[:1] if kind == "arm" and arm_named(player).scripted else experiment.seeds
-        for seed in seeds:
+        for seed in experiment.seeds:
             config = {"environment": environment, kind: player, "seed": seed, "options": options, **experiment.tests}
             config |= sources
             tasks.append(Task(config, point))

@@ -20,6 +20,7 @@ import pandas as pd
 import tyro
 
 from rss_shield.command_line import parsed
+from rss_shield.eval.arms import arm_named
 from rss_shield.eval.files import folder_for, refuse, to_json, write_json
 from rss_shield.eval.metrics import with_outcomes
 from rss_shield.eval.progress import progress_bar
@@ -87,11 +88,11 @@ class Sweep:
     def run(self) -> None:
         experiment = self.experiment
         if experiment.drawn is None:
-            self.do(tasks_of(experiment))
+            self.do(distinct_tasks_of(experiment))
         elif experiment.by_optuna:
             self._ask_optuna()
         else:
-            self.do([task for sample in samples_of(experiment.drawn) for task in tasks_of(experiment, sample)])
+            self.do([task for sample in samples_of(experiment.drawn) for task in distinct_tasks_of(experiment, sample)])
 
     def do(self, tasks: list[Task]) -> None:
         """Run what is not there yet."""
@@ -144,7 +145,8 @@ class Sweep:
         for first in range(0, drawn.tasks, drawn.batch):
             trials = [study.ask() for _ in range(min(drawn.batch, drawn.tasks - first))]
             tasks = [
-                tasks_of(self.experiment, {n: _suggest(trial, n, s) for n, s in drawn.over.items()}) for trial in trials
+                distinct_tasks_of(self.experiment, {n: _suggest(trial, n, s) for n, s in drawn.over.items()})
+                for trial in trials
             ]
             self.do([task for some in tasks for task in some])
             for trial, some in zip(trials, tasks, strict=True):
@@ -203,6 +205,17 @@ def metrics_of(experiment: Experiment) -> list[str]:
     """What an experiment is about: its axes, and what Optuna is told."""
     objectives = experiment.drawn.objectives if experiment.drawn is not None else ()
     return [experiment.safety, experiment.performance, *(metric for metric, _ in objectives)]
+
+
+def distinct_tasks_of(experiment: Experiment, drawn: dict[str, Any] | None = None) -> list[Task]:
+    """As `eval.runs.tasks.tasks_of`, once of arms that learn nothing: they do the same with every training seed."""
+    first = experiment.seeds[0]
+    tasks = tasks_of(experiment, drawn)
+    return [task for task in tasks if task.config["seed"] == first or not _is_scripted(task)]
+
+
+def _is_scripted(task: Task) -> bool:
+    return "arm" in task.config and arm_named(task.config["arm"]).scripted
 
 
 def check_tasks(tasks: list[Task]) -> None:

@@ -15,7 +15,7 @@ from rss_shield.eval.runs.names import flat, nested
 from rss_shield.eval.runs.store import Store
 from rss_shield.eval.runs.tasks import Task, key_of, samples_of, tasks_of
 from rss_shield.eval.suite.setup import setup_of
-from rss_shield.eval.suite.sweep import check_tasks
+from rss_shield.eval.suite.sweep import check_tasks, distinct_tasks_of
 from rss_shield.shield.params import PRESETS
 
 LEAST = {"name": "x", "policies": ["faster"]}
@@ -200,7 +200,7 @@ def test_who_learns_nothing_is_tested_once_whatever_the_training_seeds(tmp_path,
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "sitting_driver.py").write_text("def drive(observations):\n    return None\n")
     arms = ["lazy", "sitting_driver:drive", "shielded"]
-    tasks = tasks_of(experiment_of({"name": "x", "arms": arms, "seeds": [3, 4, 5]}))
+    tasks = distinct_tasks_of(experiment_of({"name": "x", "arms": arms, "seeds": [3, 4, 5]}))
     seeds = {arm: [task.config["seed"] for task in tasks if task.config["arm"] == arm] for arm in arms}
     assert seeds == {"lazy": [3], "sitting_driver:drive": [3], "shielded": [3, 4, 5]}
 
