@@ -10,6 +10,7 @@ from scipy import stats
 from rss_shield.eval.stats.interval import SEEDS, Interval
 
 RESAMPLES = 2000
+MOST = 2_000_000  # numbers in memory at a time
 Statistic = Callable[..., Any]  # of `[..., K]`, called with axis=-1
 
 
@@ -86,10 +87,18 @@ def pooled_bootstrap(
         return cluster_bootstrap(samples, rng, statistic, confidence, resamples)
     value = float(statistic(np.concatenate(samples), axis=-1))
     drawn = rng.integers(count, size=(resamples, count))
-    values = [
-        statistic(np.concatenate([rng.choice(samples[s], samples[s].size) for s in row]), axis=-1) for row in drawn
-    ]
-    return _student(value, np.asarray(values, float), count, confidence)
+    if len({sample.size for sample in samples}) == 1:
+        table, size = np.stack(samples), samples[0].size
+        together = max(MOST // table.size, 1)  # resamples at once
+        parts = [drawn[first : first + together] for first in range(0, resamples, together)]
+        picked = (
+            np.take_along_axis(table[part], rng.integers(size, size=(*part.shape, size)), axis=2) for part in parts
+        )
+        values = np.concatenate([statistic(part.reshape(len(part), -1), axis=-1) for part in picked])
+    else:
+        rows = (np.concatenate([rng.choice(samples[s], samples[s].size) for s in row]) for row in drawn)
+        values = np.array([statistic(row, axis=-1) for row in rows], float)
+    return _student(value, values, count, confidence)
 
 
 def _samples(seeds: Sequence[ArrayLike]) -> list[np.ndarray]:

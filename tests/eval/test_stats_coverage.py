@@ -16,6 +16,7 @@ from rss_shield.eval.stats import (
     interquartile_mean,
     mcnemar,
     performance_profile,
+    pooled_bootstrap,
     probability_of_improvement,
     student,
     wilson,
@@ -99,6 +100,19 @@ def test_seeds_and_episodes_cover_rates():
         return cluster_bootstrap(rng.random((5, 100)) < rates, rng, resamples=300)
 
     assert 0.93 <= coverage(interval, 0.25, np.random.default_rng(6)) <= 0.98
+
+
+@pytest.mark.parametrize("between", [0.0, 0.3, 3.0])
+@pytest.mark.parametrize("sizes", [[20] * 5, [10, 20, 20, 30, 20]], ids=["as many", "unlike"])
+def test_medians_of_all_episodes_cover(between, sizes):
+    """Episodes and seeds are spread evenly to both sides, so the median of all that there could be is 0."""
+
+    def interval(rng):
+        centres = rng.normal(0.0, between, len(sizes))
+        samples = [rng.normal(centre, 1.0, size) for centre, size in zip(centres, sizes, strict=True)]
+        return pooled_bootstrap(samples, rng, np.median, resamples=100)
+
+    assert coverage(interval, 0.0, np.random.default_rng(10)) >= 0.93
 
 
 def test_paired_differences_cover():
