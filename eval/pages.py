@@ -97,6 +97,13 @@ def _told(config: dict[str, Any]) -> list[Any]:
         words += ["--reward", config["reward"]]
     if config["intervention_penalty"]:
         words += ["--intervention-penalty", config["intervention_penalty"]]
+    for name, usual in (("eval_episodes", 1000), ("explore_for", 1), ("history", 1), ("network", "mlp")):
+        if config.get(name, usual) != usual:
+            words += [f"--{name.replace('_', '-')}", config[name]]
+    if config.get("config"):
+        words += ["--config", json.dumps(config["config"])]
+    for name, value in config.get("hyperparameters", {}).items():
+        words += [f"--hyperparameters.{name.replace('_', '-')}", json.dumps(value)]
     return words
 
 

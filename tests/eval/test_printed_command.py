@@ -67,6 +67,11 @@ def test_names_that_a_command_line_would_alter_are_given_as_a_whole():
 def test_a_run_that_has_not_recorded_its_command_has_as_much_as_is_known():
     config = {"env_id": "merge-v0", "total_timesteps": 5, "seeds": [0], "parameters": {}, "intervention_penalty": 0.0}
     assert pages.command({"config": config}) == "rss-shield train --env-id merge-v0 --total-timesteps 5 --seeds 0"
+    seeing = {"config": {"duration": 9}, "history": 2, "network": "sets", "hyperparameters": {"gamma": 0.9}}
+    words = shlex.split(pages.command({"config": {**config, **seeing, "eval_episodes": 200}}))[2:]
+    options, _ = started(words)
+    assert (options.config, options.history, options.network) == ({"duration": 9}, 2, "sets")
+    assert (options.hyperparameters, options.eval_episodes) == ({"gamma": 0.9}, 200)
 
 
 def test_a_command_is_no_part_of_what_a_run_is(tmp_path):
