@@ -1,10 +1,12 @@
 """A run's folder is made once and gone on with only under the same configuration."""
 
 import json
+import subprocess
 
 import numpy as np
 import pytest
 
+from rss_shield.eval import run_folder
 from rss_shield.eval.files import atomic, to_json, write_json
 from rss_shield.eval.run_folder import open_run, recorded
 from rss_shield.eval.runs.experiment import experiment_of
@@ -80,6 +82,19 @@ def test_the_configuration_of_a_run_is_read_back(tmp_path):
     (tmp_path / "config.json").write_text("{")
     with pytest.raises(ValueError, match=r"config\.json cannot be read"):
         recorded(tmp_path)
+
+
+def test_code_is_changed_by_hand_where_it_is_and_not_where_pages_are_written(tmp_path, monkeypatch):
+    for folder in ("eval", "docs/results"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "file").write_text("as it was\n")
+    for words in (["init", "-q"], ["add", "."], ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-qm", "all"]):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    monkeypatch.setattr(run_folder, "__file__", str(tmp_path / "eval" / "run_folder.py"))
+    (tmp_path / "docs" / "results" / "file").write_text("a page\n")
+    assert run_folder.versions()["git_commit"] and run_folder.versions()["git_changes"] is None
+    (tmp_path / "eval" / "file").write_text("altered\n")
+    assert run_folder.versions()["git_changes"] is not None
 
 
 def test_changed_packages_are_reported_when_a_run_goes_on(tmp_path):
