@@ -48,19 +48,16 @@ class CurveRecorder(BaseCallback):
 
     def _on_training_start(self) -> None:
         self.file = self.path.open("a", newline="", encoding="utf-8")
-        self.returns = np.zeros(self.training_env.num_envs)
         self.lengths = np.zeros(self.training_env.num_envs, int)
 
     def _on_step(self) -> bool:
-        env: Any = self.training_env
-        n_envs, rewards, dones = env.num_envs, self.locals["rewards"], self.locals["dones"]
-        self.returns += env.earned
+        n_envs, rewards, dones = self.training_env.num_envs, self.locals["rewards"], self.locals["dones"]
         self.lengths += 1
         infos = self.locals["infos"]
         ended = [episode_row(self.num_timesteps, n_envs, infos[e]) for e in np.flatnonzero(dones).tolist()]
         if ended:
             self._write(ended)
-        self.returns[dones], self.lengths[dones] = 0.0, 0
+        self.lengths[dones] = 0
         at_fault = sum(row["blame"] in ("ego", "both") for row in ended)
         self.logger.record_mean("decision/reward", float(np.mean(rewards)))
         self.logger.record_mean("decision/crashes", sum(row["crashed"] for row in ended) / n_envs)
@@ -69,13 +66,12 @@ class CurveRecorder(BaseCallback):
         return True
 
     def _on_training_end(self) -> None:
-        infos, n_envs = self.training_env.last_infos, self.training_env.num_envs  # type: ignore[attr-defined]
+        env: Any = self.training_env
         unfinished = np.flatnonzero(self.lengths).tolist()
+        so_far = ({"episode": {"r": env.returns[e], "l": self.lengths[e]}} for e in unfinished)
         self._write(
-            episode_row(
-                self.num_timesteps, n_envs, one(infos, e) | {"episode": {"r": self.returns[e], "l": self.lengths[e]}}, 1
-            )
-            for e in unfinished
+            episode_row(self.num_timesteps, env.num_envs, one(env.last_infos, e) | episode, 1)
+            for e, episode in zip(unfinished, so_far, strict=True)
         )
         self.file.close()
 

@@ -44,7 +44,7 @@ class VectorEnvAdapter(VecEnv):
         # takes the place of the environment's rewards, before anything is charged
         self.reward: Reward | None = None
         self.last_infos: dict = {}
-        self.earned = np.zeros(env.num_envs)  # by the last step, before anything is charged; their sum is a return
+        self.returns = np.zeros(env.num_envs)  # of the episodes so far, before anything is charged
         self.ended = np.zeros(env.num_envs, bool)  # by the last step
         self.truncated = np.zeros(env.num_envs, bool)
         self._seed: int | None = None
@@ -54,7 +54,7 @@ class VectorEnvAdapter(VecEnv):
         observations, self.last_infos = self.env.reset(seed=self._seed)
         self._seed = None
         self.ended, self.truncated = np.zeros((2, self.num_envs), bool)
-        self._sums = np.zeros(self.num_envs)  # of what was earned in the episode so far
+        self.returns = np.zeros(self.num_envs)
         if self.charge is not None:
             self.charge.begin()
         self.reset_infos = [{} for _ in range(self.num_envs)]
@@ -75,16 +75,15 @@ class VectorEnvAdapter(VecEnv):
         charged = self._charged_by_environment(rewards)
         if self.reward is not None:
             rewards = rewards_by(self.reward, rewards, self._actions, infos, self.ended)
-        self.earned = rewards + charged
-        self._sums += self.earned
+        self.returns += rewards + charged
         nothing: dict = {}
         list_of_infos = [nothing] * self.num_envs
         for e in np.flatnonzero(self.ended).tolist():
             info = one(infos["final_info"], e)
             info["terminal_observation"] = infos["final_obs"][e]
             info["TimeLimit.truncated"] = bool(self.truncated[e])
-            info["episode"] = {**info["episode"], "r": self._sums[e]}
-            self._sums[e] = 0.0
+            info["episode"] = {**info["episode"], "r": self.returns[e]}
+            self.returns[e] = 0.0
             list_of_infos[e] = info
         return observations, self._charged(rewards), self.ended, list_of_infos
 

@@ -28,7 +28,7 @@ PACKAGES = (
     "stable-baselines3",
     "torch",
 )
-CODE = (":(top)", ":(top,exclude)docs")  # pages of results are written by what they tell of
+_CODE_PATHS = (":(top)", ":(top,exclude)docs")  # pages of results are written by what they tell of
 SOURCES = "sources."  # of a record: digests of what a user brought along, by name
 Change = tuple[str, Any, Any]  # dotted name, now, before
 PAGES = "pages"  # folder in a run: episodes that play
@@ -158,7 +158,7 @@ def versions() -> dict[str, Any]:
         "cpu": llvmlite.binding.get_host_cpu_name(),  # what is compiled for it may round the last bit differently
         "packages": {name: _version(name) for name in PACKAGES},
         "git_commit": _git("rev-parse", "HEAD"),
-        "git_changes": _digest(_git("diff", "HEAD", "--", *CODE)),
+        "git_changes": _digest(_git("diff", "HEAD", "--", *_CODE_PATHS)),
     }
 
 

@@ -45,7 +45,7 @@ class EndsAtIntervention(VectorEnvAdapter):
         self.penalty = penalty
 
     def reset(self):
-        self.returns, self.lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
+        self.lengths = np.zeros(self.num_envs, int)
         return super().reset()
 
     def step_wait(self):
@@ -53,7 +53,6 @@ class EndsAtIntervention(VectorEnvAdapter):
         intervened = np.asarray(self.told("shield", "override_fraction")) > 0.0
         intervened |= np.asarray(self.told("shield", "mean_acceleration_change")) > CHANGE
         rewards -= np.float32(self.penalty) * intervened
-        self.returns += self.earned
         self.lengths += 1
         for e in np.flatnonzero(intervened & ended).tolist():
             list_of_infos[e]["TimeLimit.truncated"] = False  # nothing is hoped for after an intervention
@@ -70,8 +69,8 @@ class EndsAtIntervention(VectorEnvAdapter):
                 }
             begun, _ = self.env.reset(options={"reset_mask": stopped})
             observations[stopped] = begun[stopped]
-            self._sums[stopped] = 0.0
+            self.returns[stopped] = 0.0
         over = ended | stopped
         self.truncated = self.truncated & ~intervened
-        self.returns[over], self.lengths[over] = 0.0, 0
+        self.lengths[over] = 0
         return observations, rewards, over, list_of_infos

@@ -117,8 +117,10 @@ class Sweep:
         Raises:
           ValueError: they have not; of several environments others may have it.
         """
+        if self.checked or len(self.experiment.environments) > 1:
+            return
         there = next((task for task in tasks if self.store.has(task)), None)
-        if there is None or self.checked or len(self.experiment.environments) > 1:
+        if there is None:
             return
         columns = with_outcomes(self.episodes(there)).columns
         check_there(self.metrics, columns, f"episodes on {there.config['environment']} with these options")
