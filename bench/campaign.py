@@ -176,16 +176,18 @@ def main() -> None:
         print(f"written: {write(done, arguments.out)}")
     if arguments.ship:
         for part in chosen:
-            ship(part, runs, ROOT / "models")
+            if is_done(part, runs, arguments.divide):
+                ship(part, runs, ROOT / "models")
 
 
 def ship(part: Part, runs: Path, to: Path) -> None:
     """The models of a part's first seed, made small, and their cards with what the small ones do in tests."""
     run = folder_of(part, runs)
     record = json.loads((run / "config.json").read_text(encoding="utf-8"))
-    trained = ((arm, run / f"{arm}-seed0" / "model.zip") for arm in part.arms)
-    for arm, model in ((arm, model) for arm, model in trained if model.exists()):
-        folder = to / part.env_id / arm
+    for arm in part.arms:
+        model, folder = run / f"{arm}-seed0" / "model.zip", to / part.env_id / arm
+        if not model.exists():  # nobody learns
+            continue
         folder.mkdir(parents=True, exist_ok=True)
         with atomic(folder / "model.zip") as small:
             write_slim(model, small)

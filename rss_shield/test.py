@@ -36,9 +36,10 @@ from rss_shield.eval.own import digest_of, digests, driver_named, is_own
 from rss_shield.eval.progress import move_to, progress_bar
 from rss_shield.eval.rollout import evaluate
 from rss_shield.eval.run_folder import changes, versions
+from rss_shield.eval.suite.comparison.options import FIRST_TEST_SEED
 from rss_shield.eval.suite.own_table import KNOWN_PRESETS, is_file, preset_in, usual_preset
 from rss_shield.eval.suite.scored import columns_of, scored
-from rss_shield.eval.suite.tested import FIRST_SEED, check_free, title_of
+from rss_shield.eval.suite.tested import check_free, title_of
 from rss_shield.eval.table import print_table, write_table
 from rss_shield.shield.junctions.memory import ENTRIES
 from rss_shield.shield.junctions.plans import INTENTS
@@ -82,7 +83,7 @@ class Config:
     """With what: off (the shield only watches and judges), on (it overrides), or both; also what the card names."""
     episodes: int = 1000
     """How many, on the same seeds for all tests."""
-    first_seed: int = FIRST_SEED
+    first_seed: int = FIRST_TEST_SEED
     """Seed of the first; the others follow."""
     backend: str = "fast"
     """What simulates: fast (the compiled engine) or highway-env (the original)."""

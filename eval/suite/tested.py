@@ -8,9 +8,9 @@ from typing import Any
 from rss_shield.eval.arms import OFF_AND_ON
 from rss_shield.eval.files import to_json
 from rss_shield.eval.run_folder import changes, given, recorded, said
+from rss_shield.eval.suite.comparison.options import FIRST_TEST_SEED
 from rss_shield.shield.params import Rules
 
-FIRST_SEED = 10**9  # as train.py's tests
 USUAL = {"reward": "", "entry": "cautious", "intent": "any", "waiting": "line", "history": 1, "backend": "fast"}
 MOST_SAID = 4  # differences in one line
 
@@ -54,7 +54,7 @@ def title_of(record: Mapping[str, Any]) -> str:
       record: options of `rss-shield test` by name; preset: the name of the one in force; ego, other: parameters that
         are not the preset's; shield: name of each test -> options of the shield.
     """
-    seeds = "" if record["first_seed"] == FIRST_SEED else f" from seed {record['first_seed']} on"
+    seeds = "" if record["first_seed"] == FIRST_TEST_SEED else f" from seed {record['first_seed']} on"
     return ", ".join(
         [
             f"{record['policy']} on {record['env_id']}{given('config', record['config'])}",
